@@ -1,0 +1,36 @@
+# Warnings that every target of the project is built with; they are errors.
+add_library(sovo_warnings INTERFACE)
+target_compile_options(sovo_warnings INTERFACE
+  $<$<COMPILE_LANGUAGE:CXX>:-Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
+  -Wnon-virtual-dtor -Wold-style-cast -Woverloaded-virtual -Werror>)
+
+# One source gives one result: no fused multiply-add that a compiler may or may not use.
+add_compile_options(-ffp-contract=off -fno-math-errno)
+
+if(SOVO_SANITIZE)
+  add_compile_options(-fsanitize=${SOVO_SANITIZE} -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${SOVO_SANITIZE})
+endif()
+
+# sovo_room(NAME [CORE] [ROOMS below...] [LINK libraries...]): the static library sovo_NAME from
+# every source below src/NAME. CORE rooms are installed as libsovo.
+function(sovo_room name)
+  cmake_parse_arguments(ROOM "CORE" "" "ROOMS;LINK" ${ARGN})
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/${name}/*.cpp)
+  list(TRANSFORM ROOM_ROOMS PREPEND sovo_)
+  if(sources)
+    add_library(sovo_${name} STATIC ${sources})
+    set(scope PUBLIC)
+    target_link_libraries(sovo_${name} PRIVATE $<BUILD_INTERFACE:sovo_warnings>)
+  else()
+    add_library(sovo_${name} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  target_include_directories(sovo_${name} ${scope}
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/include> $<INSTALL_INTERFACE:include>)
+  target_link_libraries(sovo_${name} ${scope} ${ROOM_ROOMS} ${ROOM_LINK})
+  target_compile_features(sovo_${name} ${scope} cxx_std_20)
+  if(ROOM_CORE)
+    set_property(GLOBAL APPEND PROPERTY SOVO_CORE_TARGETS sovo_${name})
+  endif()
+endfunction()

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+
+#include "sovo/geometry/camera_model.h"
+#include "sovo/geometry/se3.h"
+
+namespace sovo {
+
+/// Rotation from an optical frame (x right, y down, z forward) to a body frame (x forward, y left,
+/// z up), as REP-103 defines them.
+inline SE3 body_from_optical() {
+  Mat3 r;
+  r << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  return {r, Vec3::Zero()};
+}
+
+/// Two cameras, possibly different ones, at a fixed and known relative pose. Nothing is assumed
+/// rectified.
+struct StereoRig {
+  std::string name;
+  CameraModel left;
+  CameraModel right;
+  SE3 T_right_left;  ///< Left optical frame into right optical frame [m].
+  /// Left optical frame into the vehicle's base frame (REP-103) [m].
+  SE3 T_base_left = body_from_optical();
+
+  /// Distance between the two optical centres [m].
+  double baseline() const { return T_right_left.translation().norm(); }
+};
+
+}  // namespace sovo

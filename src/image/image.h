@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <new>
+#include <vector>
+
+namespace sovo {
+
+/// Allocator of 64-byte aligned memory (a cache line, and the widest vector register).
+template <class T>
+struct AlignedAllocator {
+  using value_type = T;
+  static constexpr std::size_t kAlignment = 64;
+
+  AlignedAllocator() = default;
+  template <class U>
+  explicit AlignedAllocator(const AlignedAllocator<U>& /*other*/) {}
+
+  T* allocate(std::size_t n) {
+    return static_cast<T*>(::operator new(n * sizeof(T), std::align_val_t(kAlignment)));
+  }
+  void deallocate(T* p, std::size_t /*n*/) { ::operator delete(p, std::align_val_t(kAlignment)); }
+  bool operator==(const AlignedAllocator& /*other*/) const { return true; }
+};
+
+template <class T>
+using AlignedVector = std::vector<T, AlignedAllocator<T>>;
+
+/// A single-channel image, rows tightly packed, row-major; `at(x, y)` with x to the right and y
+/// down. Values of a float image are grey levels in [0, 255].
+template <class T>
+class Image {
+ public:
+  Image() = default;
+  Image(int width, int height) : width_(width), height_(height) {
+    data_.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  }
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  bool empty() const { return data_.empty(); }
+  std::size_t size() const { return data_.size(); }
+
+  T* data() { return data_.data(); }
+  const T* data() const { return data_.data(); }
+  T* row(int y) { return data_.data() + static_cast<std::size_t>(y) * width_; }
+  const T* row(int y) const { return data_.data() + static_cast<std::size_t>(y) * width_; }
+  T& at(int x, int y) { return row(y)[x]; }
+  const T& at(int x, int y) const { return row(y)[x]; }
+
+  /// Changes the size; keeps the memory when it is large enough. The content is unspecified.
+  void resize(int width, int height) {
+    width_ = width;
+    height_ = height;
+    data_.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  }
+  void fill(const T& value) { data_.assign(data_.size(), value); }
+
+ private:
+  int width_ = 0;
+  int height_ = 0;
+  AlignedVector<T> data_;
+};
+
+using ImageF = Image<float>;
+using ImageU8 = Image<std::uint8_t>;
+
+}  // namespace sovo

@@ -1,0 +1,41 @@
+#include "sovo/image/pyramid.h"
+
+#include <utility>
+
+namespace sovo {
+
+namespace {
+
+void halve(const ImageF& in, ImageF* out) {
+  out->resize(in.width() / 2, in.height() / 2);
+  for (int y = 0; y < out->height(); ++y) {
+    const float* a = in.row(2 * y);
+    const float* b = in.row(2 * y + 1);
+    float* o = out->row(y);
+    for (int x = 0; x < out->width(); ++x) {
+      o[x] = 0.25F * (a[2 * x] + a[2 * x + 1] + b[2 * x] + b[2 * x + 1]);
+    }
+  }
+}
+
+}  // namespace
+
+int ImagePyramid::num_levels_for(int width, int height, int max_levels, int min_side) {
+  int levels = 1;
+  while (levels < max_levels && width / 2 >= min_side && height / 2 >= min_side) {
+    width /= 2;
+    height /= 2;
+    ++levels;
+  }
+  return levels;
+}
+
+ImagePyramid::ImagePyramid(ImageF level0, int levels) {
+  levels_.resize(static_cast<std::size_t>(levels));
+  levels_[0] = std::move(level0);
+  for (int l = 1; l < levels; ++l) {
+    halve(levels_[static_cast<std::size_t>(l - 1)], &levels_[static_cast<std::size_t>(l)]);
+  }
+}
+
+}  // namespace sovo

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "sovo/image/image.h"
+
+namespace sovo {
+
+/// An image at halved resolutions; level 0 is the full image. Level l pixel p covers level l-1
+/// pixels 2p and 2p+1 (2x2 mean), so positions map as x_l = (x_0 + 1/2) / 2^l - 1/2.
+class ImagePyramid {
+ public:
+  /// How many levels an image of this size gets: halved while both sides stay at least
+  /// `min_side` pixels, at most `max_levels`. An odd last row or column is cut.
+  static int num_levels_for(int width, int height, int max_levels = 6, int min_side = 24);
+
+  ImagePyramid() = default;
+
+  /// Builds `levels` levels from level 0, whose pixels are taken over.
+  ImagePyramid(ImageF level0, int levels);
+
+  int num_levels() const { return static_cast<int>(levels_.size()); }
+  const ImageF& level(int l) const { return levels_[static_cast<std::size_t>(l)]; }
+  const ImageF& operator[](int l) const { return level(l); }
+
+ private:
+  std::vector<ImageF> levels_;
+};
+
+using ImagePyramidPtr = std::shared_ptr<const ImagePyramid>;
+
+}  // namespace sovo

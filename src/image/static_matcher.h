@@ -1,0 +1,65 @@
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "sovo/geometry/stereo_rig.h"
+#include "sovo/image/pyramid.h"
+
+namespace sovo {
+
+struct StaticMatcherConfig {
+  double min_depth = 0.3;          ///< Nearest depth searched [m].
+  double max_depth = 0.0;          ///< Farthest depth searched [m]; 0 is infinity.
+  double min_zncc = 0.8;           ///< Least correlation of an accepted match.
+  double min_uniqueness = 0.05;    ///< Least lead in ZNCC over the second-best mode.
+  double max_back_error_px = 1.0;  ///< Left-right check, at level 0.
+  int coarsest_level = 3;          ///< Where the search over the whole range happens.
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("min_depth", min_depth, "nearest depth searched [m]");
+    v("max_depth", max_depth, "farthest depth searched [m], 0: infinity");
+    v("min_zncc", min_zncc, "least correlation of an accepted match");
+    v("min_uniqueness", min_uniqueness, "least lead in correlation over the second-best match");
+    v("max_back_error_px", max_back_error_px, "left-right check [px]");
+    v("coarsest_level", coarsest_level, "pyramid level of the exhaustive search");
+  }
+};
+
+/// How a search ended.
+enum class MatchState {
+  kMatched,
+  kLowCorrelation,
+  kAmbiguous,
+  kBackCheck,  ///< The match in the other direction leads elsewhere.
+  kOutOfView,  ///< The curve does not enter the right image.
+  kNoTexture,
+};
+
+struct StaticMatch {
+  MatchState state = MatchState::kOutOfView;
+  float inverse_depth = 0.0F;  ///< 1 / z in the left camera frame [1/m]; sub-pixel refined.
+  float sigma = 0.0F;          ///< Its standard deviation [1/m].
+  float disparity_px = 0.0F;   ///< Displacement in the right image from the point at infinity.
+  float zncc = 0.0F;
+  float across_px = 0.0F;  ///< Residual displacement across the curve (decalibration).
+};
+
+/// Matches left pixels in the simultaneous right image along the epipolar curve, by correlation,
+/// coarse to fine. The left camera is a pinhole, the right one raw with any distortion.
+class StaticMatcher {
+ public:
+  StaticMatcher(const StaticMatcherConfig& config, const StereoRig& rig);
+
+  /// Matches one left pixel (level 0, sub-pixel). `inverse_depth_range` [min, max] narrows the
+  /// search where something is known.
+  StaticMatch match(const ImagePyramid& left, const ImagePyramid& right, float u, float v,
+                    std::optional<std::pair<float, float>> inverse_depth_range = {}) const;
+
+ private:
+  StaticMatcherConfig config_;
+  StereoRig rig_;
+};
+
+}  // namespace sovo

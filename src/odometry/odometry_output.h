@@ -1,0 +1,131 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "sovo/geometry/se3.h"
+#include "sovo/scale/scale_optimizer.h"
+
+namespace sovo {
+
+/// What the odometry is doing; the values are those of VoStatus.state.
+enum class OdometryState : std::uint8_t {
+  kInitializing = 0,     ///< No map yet.
+  kTracking = 1,         ///< Pose and scale are good.
+  kScaleUnobserved = 2,  ///< Pose is tracked, the scale is not (or not yet) measured.
+  kDegraded = 3,         ///< Tracked, but badly (few points, high residual, one image missing).
+  kLost = 4,             ///< This frame has no pose.
+  kResetting = 5,
+  kStopped = 6,
+};
+
+std::string to_string(OdometryState state);
+
+/// The stages that are timed. `kFrame` is everything but decoding, once a frame.
+enum class Stage : std::uint8_t {
+  kFrame = 0,
+  kUndistortion,
+  kPyramid,
+  kTracking,
+  kTracing,
+  kSelection,
+  kStaticMatching,
+  kBundleAdjustment,
+  kMarginalization,
+  kScaleOptimization,
+  kCount,
+};
+
+/// Name as `--profile` writes it: "frame", "undistortion", ...
+std::string to_string(Stage stage);
+
+/// Everything known about one frame at the time it is published.
+struct OdometryOutput {
+  std::int64_t stamp_ns = 0;
+  std::uint64_t session = 0;
+  std::uint64_t sequence = 0;
+  OdometryState state = OdometryState::kInitializing;
+  std::string reason;  ///< For people; empty when all is well.
+
+  bool pose_valid = false;  ///< False: T_odom_left and what follows from it mean nothing.
+  SE3 T_odom_left;          ///< Left optical camera into the odometry's world; first pose identity.
+  Mat6 pose_covariance = Mat6::Zero();  ///< Of (translation, rotation) in odom axes [m, rad].
+  Vec6 velocity =
+      Vec6::Zero();  ///< Of the left camera in its own axes (linear, angular) [m/s, rad/s].
+  Mat6 velocity_covariance = Mat6::Zero();
+
+  std::uint32_t segment = 0;      ///< Rises by one at each loss of track.
+  std::uint32_t keyframe_id = 0;  ///< Reference keyframe of the pose.
+  bool is_keyframe = false;
+
+  bool scale_valid = false;      ///< Lengths are metric.
+  double log_scale = 0.0;        ///< Sum of corrections since the segment began.
+  double log_scale_sigma = 0.0;  ///< Posterior standard deviation.
+  double last_correction = 0.0;  ///< Newest measured log-scale error.
+  double scale_residual = 0.0;   ///< Photometric, of the newest optimization [grey levels].
+  double scale_age_s = 0.0;      ///< Since the last accepted optimization.
+  ScaleVerdict scale_verdict = ScaleVerdict::kTooFewPoints;
+
+  std::uint64_t received = 0;       ///< Frames given to the odometry.
+  std::uint64_t dropped_queue = 0;  ///< Frames dropped because mapping or tracking was late.
+  std::uint64_t rejected = 0;       ///< Frames refused (bad stamp, size, content).
+  std::uint32_t reset_counter = 0;
+  std::uint32_t points = 0;     ///< Active in the window.
+  std::uint32_t inliers = 0;    ///< Pixels of the tracking reference that agree.
+  std::uint32_t keyframes = 0;  ///< In the window.
+  std::uint32_t queue_depth = 0;
+  double sync_error_s = 0.0;
+  double residual = 0.0;  ///< RMS of tracking [grey levels].
+  double distance_m = 0.0;
+};
+
+/// A keyframe as bundle adjustment left it; the same id comes again when it is revised.
+struct KeyframeOutput {
+  std::uint32_t id = 0;
+  std::uint32_t segment = 0;
+  std::int64_t stamp_ns = 0;
+  SE3 T_odom_left;
+  double log_scale = 0.0;
+  std::vector<float> u, v, inverse_depth, sigma;  ///< Its own points [px, 1/m].
+  std::vector<std::uint8_t> intensity;
+};
+
+/// One run of the scale optimizer, a line of `--keyframes`.
+struct ScaleRecord {
+  std::int64_t stamp_ns = 0;
+  std::uint32_t keyframe_id = 0;
+  double correction = 0.0;  ///< Applied log-scale.
+  double measured = 0.0;    ///< Measured log-scale error.
+  double sigma = 0.0;       ///< Of the measurement.
+  ScaleVerdict verdict = ScaleVerdict::kTooFewPoints;
+  double residual = 0.0;
+};
+
+/// Receives what the odometry finds. Calls come from the odometry's threads, one at a time for
+/// each method; an implementation must not block for long.
+class OutputSink {
+ public:
+  virtual ~OutputSink() = default;
+  virtual void on_frame(const OdometryOutput& output) = 0;
+  virtual void on_keyframe(const KeyframeOutput& keyframe) = 0;
+  virtual void on_scale(const ScaleRecord& record) = 0;
+};
+
+/// Receives the time of each stage of the work; called from several threads.
+class StageObserver {
+ public:
+  virtual ~StageObserver() = default;
+  virtual void on_stage(Stage stage, double seconds) = 0;
+  /// Sizes of one bundle adjustment.
+  virtual void on_window(std::uint32_t points, std::uint32_t residuals) = 0;
+};
+
+/// A pose of a trajectory file.
+struct TrajectoryPose {
+  std::int64_t stamp_ns = 0;
+  SE3 T_odom_left;
+};
+
+}  // namespace sovo

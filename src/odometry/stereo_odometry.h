@@ -1,0 +1,131 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "sovo/image/photometric.h"
+#include "sovo/image/static_matcher.h"
+#include "sovo/image/stereo_frame.h"
+#include "sovo/image/undistorter.h"
+#include "sovo/odometry/odometry_output.h"
+#include "sovo/scale/scale_filter.h"
+#include "sovo/scale/scale_optimizer.h"
+#include "sovo/vo/direct_config.h"
+
+namespace sovo {
+
+/// Who owns the metric scale.
+enum class OdometryMode {
+  kMono,   ///< Static matches at the first keyframe only.
+  kScale,  ///< Temporal residuals in the window, scale optimization beside it (SO-DSO).
+};
+
+/// How the map begins.
+enum class InitMethod {
+  kAuto,     ///< From stereo depth when enough matches are good, else from two views.
+  kStereo,   ///< From stereo depth at the first frame.
+  kTwoView,  ///< From two views of the left camera; the scale is found by scale optimization.
+};
+
+/// Where a new point's first depth interval comes from.
+enum class DepthInit {
+  kTemporal,  ///< From epipolar search in following left images (the paper).
+  kStereo,    ///< From a static match; never a prior or a residual.
+};
+
+/// Names of enum values in configuration files, found by argument-dependent lookup.
+constexpr std::array<std::pair<OdometryMode, const char*>, 2> enum_names(OdometryMode) {
+  return {{{OdometryMode::kMono, "mono"}, {OdometryMode::kScale, "scale"}}};
+}
+constexpr std::array<std::pair<InitMethod, const char*>, 3> enum_names(InitMethod) {
+  return {{{InitMethod::kAuto, "auto"},
+           {InitMethod::kStereo, "stereo"},
+           {InitMethod::kTwoView, "two_view"}}};
+}
+constexpr std::array<std::pair<DepthInit, const char*>, 2> enum_names(DepthInit) {
+  return {{{DepthInit::kTemporal, "temporal"}, {DepthInit::kStereo, "stereo"}}};
+}
+
+struct StereoOdometryConfig {
+  OdometryMode mode = OdometryMode::kScale;
+  InitMethod init = InitMethod::kAuto;
+  double init_min_matched = 0.3;  ///< Share of good static matches that `auto` asks for.
+  DepthInit depth_init = DepthInit::kStereo;
+  int downscale = 1;           ///< Whole number by which input images are reduced.
+  bool deterministic = false;  ///< All stages in order on the caller's thread.
+  int threads = 2;             ///< Of the loops inside the stages; changes no bit of the result.
+  int seed = 0;
+  int mapping_queue = 4;  ///< Live: frames that may wait for mapping before one is dropped.
+  DirectConfig vo;
+  ScaleOptimizerConfig scale;
+  ScaleFilterConfig filter;
+  StaticMatcherConfig matcher;
+  UndistortionConfig undistortion;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("mode", mode, "who owns the metric scale");
+    v("init", init, "how the map begins");
+    v("init_min_matched", init_min_matched,
+      "share of good static matches that init: auto asks for");
+    v("depth_init", depth_init, "where a new point's first depth interval comes from");
+    v("downscale", downscale, "whole number by which input images are reduced");
+    v("deterministic", deterministic, "all stages in order on one thread");
+    v("threads", threads, "of the loops inside the stages; changes no bit of the result");
+    v("seed", seed, "of every random choice");
+    v("mapping_queue", mapping_queue, "frames that may wait for mapping before one is dropped");
+    v("vo", vo, "direct monocular odometry");
+    v("scale", scale, "scale optimization");
+    v("filter", filter, "scale filter");
+    v("matcher", matcher, "static stereo matching");
+    v("undistortion", undistortion, "undistortion of the left image");
+  }
+};
+
+/// What belongs to the cameras.
+struct StereoCameras {
+  StereoRig rig;  ///< Raw cameras, as calibrated, at full resolution.
+  PhotometricCalibration left_photometric;
+  PhotometricCalibration right_photometric;
+  ImageU8 left_mask;  ///< 0 where the image must not be used; empty: all is used.
+  ImageU8 right_mask;
+};
+
+/// Stereo visual odometry: direct monocular tracking and mapping on the left camera, and scale
+/// optimization with the right one.
+///
+/// Deterministic: `process` does everything before it returns. Live: `process` tracks the frame
+/// and publishes its pose; mapping and scale optimization run on threads of their own.
+class StereoOdometry {
+ public:
+  /// `sink` must outlive the odometry; `observer` may be null.
+  StereoOdometry(const StereoOdometryConfig& config, const StereoCameras& cameras, OutputSink* sink,
+                 StageObserver* observer = nullptr);
+  ~StereoOdometry();
+  StereoOdometry(const StereoOdometry&) = delete;
+  StereoOdometry& operator=(const StereoOdometry&) = delete;
+
+  /// Takes the next frame. Every frame yields exactly one `on_frame`, also refused ones.
+  void process(const StereoFrame& frame);
+
+  /// Waits until all work is done and all keyframes are given out; call before reading the
+  /// trajectory. More frames may follow.
+  void finish();
+
+  /// Forgets the map and begins a new segment with the next frame.
+  void reset();
+
+  /// One pose a tracked frame, as refined until its keyframe left the window; similarities later
+  /// than a keyframe's own are undone. Ascending stamps.
+  std::vector<TrajectoryPose> refined_trajectory() const;
+
+  /// The undistorted camera that is tracked.
+  const CameraModel& tracked_camera() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace sovo

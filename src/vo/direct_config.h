@@ -1,0 +1,128 @@
+#pragma once
+
+namespace sovo {
+
+/// Coarse-to-fine tracking of every frame against the newest keyframe.
+struct TrackerConfig {
+  double huber = 9.0;          ///< Of the photometric residual [grey levels].
+  double cutoff = 20.0;        ///< Residuals above count a constant and leave the normal equations.
+  int max_levels = 6;
+  double lost_rmse_factor = 1.5;   ///< A hypothesis this much better than the last frame is taken.
+  double max_rmse = 40.0;          ///< Lost above [grey levels].
+  double min_inlier_ratio = 0.3;   ///< Lost below: reference pixels in view that agree.
+  double brightness_prior_a = 100.0;  ///< Weight of a prior on the log-gain to the reference.
+  double brightness_prior_b = 0.0;    ///< The same for the bias.
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("huber", huber, "Huber threshold of the photometric residual [grey levels]");
+    v("cutoff", cutoff, "residuals above count a constant [grey levels]");
+    v("max_levels", max_levels, "pyramid levels at most");
+    v("lost_rmse_factor", lost_rmse_factor, "a motion hypothesis is taken below this x last RMSE");
+    v("max_rmse", max_rmse, "tracking is lost above [grey levels]");
+    v("min_inlier_ratio", min_inlier_ratio, "tracking is lost below");
+    v("brightness_prior_a", brightness_prior_a, "weight of the prior on the log-gain");
+    v("brightness_prior_b", brightness_prior_b, "weight of the prior on the bias");
+  }
+};
+
+/// When a frame becomes a keyframe: the weighted sum of the flow since the newest one (in units of
+/// 1120 / (width + height)), the brightness change, or a residual twice the first one's.
+struct KeyframeConfig {
+  double flow_translation = 0.04;
+  double flow_total = 0.02;
+  double brightness = 2.0;
+  double rmse_factor = 2.0;
+  int max_keyframes = 7;   ///< In the window, the newest included.
+  int min_keyframes = 5;   ///< Kept although few of their points remain.
+  double min_points_left = 0.05;  ///< A keyframe with a smaller share of its points leaves.
+  double max_brightness = 0.7;    ///< |log-gain| to the newest keyframe above which one leaves.
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("flow_translation", flow_translation, "weight of the flow without rotation");
+    v("flow_total", flow_total, "weight of the flow");
+    v("brightness", brightness, "weight of the change of log-gain");
+    v("rmse_factor", rmse_factor, "a keyframe is made above this x the first residual");
+    v("max_keyframes", max_keyframes, "keyframes in the window, 3 to 8");
+    v("min_keyframes", min_keyframes, "kept although few of their points remain");
+    v("min_points_left", min_points_left, "share of points below which a keyframe leaves");
+    v("max_brightness", max_brightness, "change of log-gain above which a keyframe leaves");
+  }
+};
+
+/// Immature points: selection, epipolar tracing, activation.
+struct PointConfig {
+  int active_points = 2000;    ///< In the window.
+  int immature_points = 1500;  ///< Selected a keyframe.
+  double max_search = 0.027;   ///< Of width + height: longest epipolar search.
+  double huber = 9.0;
+  double outlier_energy = 144.0;  ///< A pixel of the pattern; grey levels squared.
+  double min_quality = 3.0;       ///< Second-best over best energy of the search, to be activated.
+  double max_interval_px = 8.0;   ///< Search interval at activation.
+  double min_interval_px = 1.5;   ///< Below, a point is not traced any more.
+  double stereo_interval_sigmas = 3.0;  ///< Half width of the interval that a static match sets.
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("active_points", active_points, "active points in the window");
+    v("immature_points", immature_points, "points selected a keyframe");
+    v("max_search", max_search, "longest epipolar search, share of width + height");
+    v("huber", huber, "Huber threshold of the search [grey levels]");
+    v("outlier_energy", outlier_energy, "energy a pixel above which a search fails");
+    v("min_quality", min_quality, "second-best over best energy, to be activated");
+    v("max_interval_px", max_interval_px, "search interval at activation, at most [px]");
+    v("min_interval_px", min_interval_px, "search interval below which tracing stops [px]");
+    v("stereo_interval_sigmas", stereo_interval_sigmas, "half width of a static match's interval");
+  }
+};
+
+/// Sliding-window photometric bundle adjustment.
+struct WindowConfig {
+  int max_iterations = 6;
+  int min_iterations = 2;
+  double huber = 9.0;
+  double outlier_threshold = 144.0;  ///< A pixel: start value of the adaptive outlier threshold.
+  double gradient_constant = 50.0;   ///< c of the weight c^2 / (c^2 + |grad I|^2).
+  double folding_weight = 0.25;      ///< Of marginalized points' Hessians: pattern pixels correlate.
+  double damping = 1e-5;
+  double stop_threshold = 1.2;       ///< Times the step norms below which iteration stops.
+  double prior_a = 1e4;              ///< Weight of the prior on each frame's log-gain.
+  double prior_b = 1.0;              ///< The same for the bias.
+  double min_relative_information = 50.0;  ///< H_rho * mean_rho^2 of a point to be marginalized.
+  int min_good_residuals = 3;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("max_iterations", max_iterations, "of bundle adjustment");
+    v("min_iterations", min_iterations, "of bundle adjustment");
+    v("huber", huber, "Huber threshold [grey levels]");
+    v("outlier_threshold", outlier_threshold, "start of the outlier threshold, energy a pixel");
+    v("gradient_constant", gradient_constant, "c of the weight c^2 / (c^2 + |grad|^2)");
+    v("folding_weight", folding_weight, "of marginalized points' Hessians");
+    v("damping", damping, "smallest Levenberg-Marquardt damping");
+    v("stop_threshold", stop_threshold, "iteration stops below this x the step thresholds");
+    v("prior_a", prior_a, "weight of the prior on each frame's log-gain");
+    v("prior_b", prior_b, "weight of the prior on each frame's bias");
+    v("min_relative_information", min_relative_information,
+      "information on a point's log-depth needed to marginalize rather than drop it");
+    v("min_good_residuals", min_good_residuals, "residuals needed to marginalize a point");
+  }
+};
+
+struct DirectConfig {
+  TrackerConfig tracker;
+  KeyframeConfig keyframe;
+  PointConfig points;
+  WindowConfig window;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("tracker", tracker, "tracking of every frame");
+    v("keyframe", keyframe, "keyframe decision and window size");
+    v("points", points, "immature points");
+    v("window", window, "bundle adjustment");
+  }
+};
+
+}  // namespace sovo

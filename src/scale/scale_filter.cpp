@@ -1,0 +1,162 @@
+#include "sovo/scale/scale_filter.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sovo {
+
+namespace {
+
+/// Whether the keyframe could not see the scale at all: neither for nor against it.
+bool is_miss(ScaleVerdict verdict) {
+  return verdict == ScaleVerdict::kTooFewPoints || verdict == ScaleVerdict::kUnobservable ||
+         verdict == ScaleVerdict::kNoRightImage;
+}
+
+double square(double x) { return x * x; }
+
+/// Growth of the variance of a sum of correlated errors over that of independent ones, for
+/// first-order correlation `c` (AR(1)).
+double correlation_growth(double c) { return (1.0 + c) / (1.0 - c); }
+
+}  // namespace
+
+ScaleFilter::ScaleFilter(const ScaleFilterConfig& config)
+    : config_(config), process_noise_(config.process_noise) {}
+
+void ScaleFilter::reset() {
+  const double learned = process_noise_;
+  *this = ScaleFilter(config_);
+  process_noise_ = learned;
+}
+
+void ScaleFilter::lock_initial(double sigma, std::int64_t stamp_ns) {
+  locked_ = true;
+  searching_ = false;
+  disagreements_ = 0;
+  candidate_.reset();
+  variance_ = square(std::max(sigma, config_.initial_sigma));
+  path_variance_ = variance_;
+  accepted_stamp_ns_ = stamp_ns;
+}
+
+ScaleUpdate ScaleFilter::update(const ScaleMeasurement& m) {
+  if (locked_) {  // the error has walked since the last keyframe, seen or not
+    variance_ += walked(m);
+    path_variance_ += walked(m);
+  }
+  if (candidate_) candidate_->variance += walked(m);
+  ScaleUpdate update;
+  if (is_miss(m.estimate.verdict)) {
+    update.verdict = m.estimate.verdict;
+  } else if (m.cold_start) {
+    update = update_cold(m);
+  } else if (locked_) {
+    update = update_tracking(m);
+  } else {
+    update.verdict = m.estimate.verdict;  // no cold start yet: there is nothing to compare with
+  }
+  last_verdict_ = update.verdict;
+  return update;
+}
+
+ScaleUpdate ScaleFilter::update_tracking(const ScaleMeasurement& m) {
+  ScaleUpdate update;
+  update.verdict = m.estimate.verdict;
+  if (m.estimate.verdict != ScaleVerdict::kAccepted) {
+    disagree();
+    return update;
+  }
+  update.innovation = m.estimate.log_scale - m.pending_log_scale;
+  update.nis = square(update.innovation) / (variance_ + square(m.estimate.sigma));
+  learn(update.nis);
+  if (!within_gate(update)) {
+    update.verdict = ScaleVerdict::kInnovation;
+    disagree();
+    return update;
+  }
+  return correct(m, update);
+}
+
+ScaleUpdate ScaleFilter::update_cold(const ScaleMeasurement& m) {
+  ScaleUpdate update;
+  update.verdict = m.estimate.verdict;
+  update.innovation = m.estimate.log_scale - m.pending_log_scale;
+  const double variance = square(m.estimate.sigma);
+  if (update.verdict == ScaleVerdict::kAccepted) {
+    if (!locked_) return lock_on(m, update, variance);
+    update.nis = square(update.innovation) / (variance_ + variance);
+    return within_gate(update) ? correct(m, update) : lock_on(m, update, variance);
+  }
+  if (update.verdict != ScaleVerdict::kAmbiguous) {
+    candidate_.reset();
+    return update;
+  }
+  const bool agrees =
+      candidate_ && square(update.innovation - candidate_->log_scale) <=
+                        square(config_.gate_sigmas) * (candidate_->variance + variance);
+  if (agrees) return lock_on(m, update, variance);
+  candidate_ = Candidate{update.innovation, variance};
+  return update;
+}
+
+/// Kalman correction. The gain takes measurements as independent, for correlation is no reason to
+/// lag behind; the covariance (Joseph form) counts it.
+ScaleUpdate ScaleFilter::correct(const ScaleMeasurement& m, ScaleUpdate update) {
+  const double R = square(m.estimate.sigma);
+  const double K = variance_ / (variance_ + R);
+  const double c = config_.max_correlation * std::clamp(m.shared_points, 0.0, 1.0);
+  update.apply = true;
+  update.gain = K;
+  update.log_scale_correction = K * update.innovation;
+  update.verdict = ScaleVerdict::kAccepted;
+  variance_ = square(1.0 - K) * variance_ + square(K) * R * correlation_growth(c * (1.0 - K));
+  // Spectrum of the error at frequency zero: noise passes entire, the walk as it lags.
+  path_variance_ = R * correlation_growth(c) + square((1.0 - K) / K) * walked(m);
+  disagreements_ = 0;
+  searching_ = false;
+  accepted_stamp_ns_ = m.stamp_ns;
+  return update;
+}
+
+/// Takes the measurement whole.
+ScaleUpdate ScaleFilter::lock_on(const ScaleMeasurement& m, ScaleUpdate update, double variance) {
+  lock_initial(0.0, m.stamp_ns);
+  variance_ = variance;
+  path_variance_ = variance;
+  update.apply = true;
+  update.gain = 1.0;
+  update.log_scale_correction = update.innovation;
+  update.verdict = ScaleVerdict::kAccepted;
+  return update;
+}
+
+void ScaleFilter::disagree() {
+  ++disagreements_;
+  if (disagreements_ >= config_.cold_start_after) searching_ = true;
+}
+
+/// Moves the process noise so that the mean of the normalized innovation squared becomes one.
+void ScaleFilter::learn(double nis) {
+  const double excess = std::min(nis, square(config_.gate_sigmas)) - 1.0;
+  process_noise_ = std::clamp(process_noise_ * std::exp(config_.learning_rate * excess),
+                              config_.min_process_noise, config_.max_process_noise);
+}
+
+bool ScaleFilter::within_gate(const ScaleUpdate& update) const {
+  return update.nis <= square(config_.gate_sigmas);
+}
+
+double ScaleFilter::walked(const ScaleMeasurement& m) const {
+  return process_noise_ * std::max(m.distance, config_.min_distance);
+}
+
+double ScaleFilter::sigma() const { return std::sqrt(variance_); }
+
+double ScaleFilter::path_sigma() const { return std::sqrt(path_variance_); }
+
+double ScaleFilter::age_s(std::int64_t stamp_ns) const {
+  return locked_ ? 1e-9 * static_cast<double>(stamp_ns - accepted_stamp_ns_) : 0.0;
+}
+
+}  // namespace sovo

@@ -1,0 +1,120 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "sovo/scale/scale_optimizer.h"
+
+namespace sovo {
+
+struct ScaleFilterConfig {
+  /// Random walk of the log-scale error: variance a unit of distance, where the distance between
+  /// keyframes is counted in median depths of the points. A monocular window renews its points,
+  /// and so forgets its scale, by parallax: this makes one number fit a cave and a street.
+  double process_noise = 3e-4;
+  double min_process_noise = 3e-5;  ///< Bounds of what is learned.
+  double max_process_noise = 3e-3;
+  double min_distance = 0.02;     ///< Distance counted at least, a keyframe [median depths].
+  double learning_rate = 0.05;    ///< Of process noise from innovations; 0 holds it.
+  double gate_sigmas = 3.0;       ///< Innovations beyond are confident disagreements.
+  int cold_start_after = 6;       ///< Disagreements in a row that ask for a cold start.
+  double max_correlation = 0.85;  ///< Of measurements on keyframes that share all their points.
+  double initial_sigma = 0.02;    ///< Floor of the sigma of a scale given by stereo depth.
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("process_noise", process_noise,
+      "variance of log-scale gained over a distance of one median depth");
+    v("min_process_noise", min_process_noise, "least process noise that is learned");
+    v("max_process_noise", max_process_noise, "largest process noise that is learned");
+    v("min_distance", min_distance, "distance counted at least, a keyframe [median depths]");
+    v("learning_rate", learning_rate, "of the process noise; 0 holds it");
+    v("gate_sigmas", gate_sigmas, "innovations beyond this are disagreements");
+    v("cold_start_after", cold_start_after, "disagreements in a row that ask for a cold start");
+    v("max_correlation", max_correlation,
+      "correlation of measurements on keyframes that share all their points");
+    v("initial_sigma", initial_sigma, "least sigma of a scale given by stereo depth");
+  }
+};
+
+/// A scale optimization with what the filter must know of its keyframe.
+struct ScaleMeasurement {
+  ScaleEstimate estimate;
+  bool cold_start = false;  ///< The estimate searched the whole range.
+  std::int64_t stamp_ns = 0;
+  double distance = 0.0;         ///< Since the last measurement's keyframe [median depths].
+  double shared_points = 0.0;    ///< Share of points that the last measurement had too, 0 to 1.
+  double pending_log_scale = 0;  ///< Issued corrections not yet applied to the snapshot.
+};
+
+/// What the filter makes of a measurement.
+struct ScaleUpdate {
+  bool apply = false;                                  ///< Whether a correction is to be applied.
+  double log_scale_correction = 0.0;                   ///< To be applied on top of what is pending.
+  double gain = 0.0;                                   ///< K: correction = K * innovation.
+  double innovation = 0.0;                             ///< Measured log-scale less what is pending.
+  double nis = 0.0;                                    ///< Innovation squared over its variance.
+  ScaleVerdict verdict = ScaleVerdict::kTooFewPoints;  ///< The estimate's, or kInnovation.
+};
+
+/// Kalman filter of the log-scale error of a monocular window: P += q d, K = P / (P + R). Each
+/// correction is applied at once, so that the expected error is always zero.
+///
+/// The gain fights lag: with constant drift e a keyframe the error stays at e (1 - K) / K. Before
+/// the first lock nothing is applied: it takes an accepted cold start, or two ambiguous ones that
+/// agree. Keyframes that cannot see the scale (too few points or disparities, no right image)
+/// count neither for nor against it.
+class ScaleFilter {
+ public:
+  explicit ScaleFilter(const ScaleFilterConfig& config);
+
+  /// Stereo depth has given the window its scale: starts locked, with this standard deviation.
+  void lock_initial(double sigma, std::int64_t stamp_ns);
+
+  /// Forgets everything but the learned process noise.
+  void reset();
+
+  ScaleUpdate update(const ScaleMeasurement& measurement);
+
+  bool locked() const { return locked_; }
+  /// Whether the next estimate should search the whole range.
+  bool wants_cold_start() const { return !locked_ || searching_; }
+  /// Standard deviation of the log-scale error after the last correction.
+  double sigma() const;
+  /// Standard deviation to take when keyframes' errors are summed as if independent: it makes up
+  /// for their correlation.
+  double path_sigma() const;
+  /// Seconds from the last accepted measurement (or lock) to `stamp_ns`; 0 before the first.
+  double age_s(std::int64_t stamp_ns) const;
+  ScaleVerdict last_verdict() const { return last_verdict_; }
+  int disagreements() const { return disagreements_; }
+  double process_noise() const { return process_noise_; }
+
+ private:
+  struct Candidate {
+    double log_scale;
+    double variance;
+  };
+
+  ScaleUpdate update_tracking(const ScaleMeasurement& m);
+  ScaleUpdate update_cold(const ScaleMeasurement& m);
+  ScaleUpdate correct(const ScaleMeasurement& m, ScaleUpdate update);
+  ScaleUpdate lock_on(const ScaleMeasurement& m, ScaleUpdate update, double variance);
+  void disagree();
+  void learn(double nis);
+  bool within_gate(const ScaleUpdate& update) const;
+  double walked(const ScaleMeasurement& m) const;
+
+  ScaleFilterConfig config_;
+  bool locked_ = false;
+  bool searching_ = false;  ///< Locked, but doubted: cold starts are asked for.
+  double variance_ = 0.0;   ///< P
+  double path_variance_ = 0.0;
+  double process_noise_ = 0.0;
+  int disagreements_ = 0;
+  std::int64_t accepted_stamp_ns_ = 0;
+  ScaleVerdict last_verdict_ = ScaleVerdict::kTooFewPoints;
+  std::optional<Candidate> candidate_;
+};
+
+}  // namespace sovo

@@ -1,0 +1,323 @@
+#include "sovo/vo/pixel_selector.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace sovo {
+namespace {
+
+constexpr int kMaxMedian = 48;  // the histogram's cap [grey levels / px]
+constexpr int kNumDirections = 16;
+constexpr int kMaxBlock = 64;
+
+struct Directions {
+  std::array<float, kNumDirections> x{}, y{};
+};
+
+Directions make_directions() {
+  Directions directions;
+  for (std::size_t k = 0; k < kNumDirections; ++k) {
+    const double angle = std::numbers::pi * static_cast<double>(k) / kNumDirections;
+    directions.x[k] = static_cast<float>(std::cos(angle));
+    directions.y[k] = static_cast<float>(std::sin(angle));
+  }
+  return directions;
+}
+
+float squared_gradient(const ImageF& image, int x, int y) {
+  const float* row = image.row(y) + x;
+  const float gx = 0.5F * (row[1] - row[-1]);
+  const float gy = 0.5F * (row[image.width()] - row[-image.width()]);
+  return gx * gx + gy * gy;
+}
+
+/// Median of |grad I| over every second pixel of every second row of [x0, x1) x [y0, y1).
+float median_gradient(const ImageF& image, int x0, int x1, int y0, int y1) {
+  std::array<int, kMaxMedian + 1> histogram{};
+  int count = 0;
+  for (int y = y0; y < y1; y += 2) {
+    for (int x = x0; x < x1; x += 2) {
+      const float g2 =
+          std::min(squared_gradient(image, x, y), static_cast<float>(kMaxMedian * kMaxMedian));
+      ++histogram[static_cast<std::size_t>(std::sqrt(g2))];
+      ++count;
+    }
+  }
+  int below = 0;
+  for (int g = 0; g <= kMaxMedian; ++g) {
+    below += histogram[static_cast<std::size_t>(g)];
+    if (2 * below >= count) return static_cast<float>(g);
+  }
+  return 0.0F;
+}
+
+int region_begin(int region, int num_regions, int size) { return region * size / num_regions; }
+
+int ceil_div(int a, int b) { return (a + b - 1) / b; }
+
+}  // namespace
+
+PixelSelector::PixelSelector(const PixelSelectorConfig& config) : config_(config) { reset(); }
+
+void PixelSelector::reset() {
+  random_state_ = static_cast<std::uint64_t>(config_.seed);
+  block_ = std::clamp(config_.initial_block, 1, kMaxBlock);
+}
+
+/// SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators"), upper half.
+std::uint32_t PixelSelector::random() {
+  random_state_ += 0x9e3779b97f4a7c15ULL;
+  std::uint64_t z = random_state_;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+  return static_cast<std::uint32_t>((z ^ (z >> 31)) >> 32);
+}
+
+void PixelSelector::select(const ImagePyramid& pyramid, const ImageU8* mask, int wanted,
+                           std::vector<SelectedPixel>* out) {
+  out->clear();
+  const ImageF& image = pyramid[0];
+  const int least = 2 * std::max(1, config_.border) + 1;
+  if (wanted <= 0 || image.width() < least || image.height() < least) return;
+  masked_ = mask != nullptr && !mask->empty();
+  if (masked_) erode_mask(*mask);
+  compute_thresholds(image);
+
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    select_all_levels(pyramid, out);
+    // n = K / d^2 pixels from blocks of side d, solved for the largest d that gives enough.
+    const double ratio = static_cast<double>(out->size()) / wanted;
+    const int used = block_;
+    block_ = std::clamp(static_cast<int>(std::sqrt(ratio) * used), 1, kMaxBlock);
+    const bool retry = ratio < config_.reselect_below || ratio > config_.reselect_above;
+    if (!retry || block_ == used) break;
+  }
+  if (out->size() > static_cast<std::size_t>(wanted)) thin(wanted, out);
+}
+
+void PixelSelector::compute_thresholds(const ImageF& image) {
+  const int side = std::max(8, config_.threshold_block);
+  const int w = image.width();
+  const int h = image.height();
+  regions_x_ = std::max(1, (w + side / 2) / side);
+  regions_y_ = std::max(1, (h + side / 2) / side);
+  medians_.resize(static_cast<std::size_t>(regions_x_) * regions_y_);
+  thresholds_.resize(medians_.size());
+  for (int ry = 0; ry < regions_y_; ++ry) {
+    const int y0 = std::max(1, region_begin(ry, regions_y_, h));
+    const int y1 = std::min(h - 1, region_begin(ry + 1, regions_y_, h));
+    for (int rx = 0; rx < regions_x_; ++rx) {
+      const int x0 = std::max(1, region_begin(rx, regions_x_, w));
+      const int x1 = std::min(w - 1, region_begin(rx + 1, regions_x_, w));
+      medians_[static_cast<std::size_t>(ry * regions_x_ + rx)] =
+          median_gradient(image, x0, x1, y0, y1) + static_cast<float>(config_.threshold_offset);
+    }
+  }
+  for (int ry = 0; ry < regions_y_; ++ry) {
+    for (int rx = 0; rx < regions_x_; ++rx) {
+      float sum = 0.0F;
+      int count = 0;
+      for (int y = std::max(0, ry - 1); y <= std::min(regions_y_ - 1, ry + 1); ++y) {
+        for (int x = std::max(0, rx - 1); x <= std::min(regions_x_ - 1, rx + 1); ++x) {
+          sum += medians_[static_cast<std::size_t>(y * regions_x_ + x)];
+          ++count;
+        }
+      }
+      const float mean = sum / static_cast<float>(count);
+      thresholds_[static_cast<std::size_t>(ry * regions_x_ + rx)] = mean * mean;
+    }
+  }
+}
+
+/// `allowed_`: the minimum of the mask over a square of side 2 mask_border + 1, rows first.
+void PixelSelector::erode_mask(const ImageU8& mask) {
+  const int w = mask.width();
+  const int h = mask.height();
+  const int r = std::max(0, config_.mask_border);
+  erosion_rows_.resize(w, h);
+  allowed_.resize(w, h);
+  for (int y = 0; y < h; ++y) {
+    std::uint8_t* out = erosion_rows_.row(y);
+    std::copy_n(mask.row(y), w, out);
+    for (int k = std::max(0, y - r); k <= std::min(h - 1, y + r); ++k) {
+      const std::uint8_t* in = mask.row(k);
+      for (int x = 0; x < w; ++x) out[x] = std::min(out[x], in[x]);
+    }
+  }
+  for (int y = 0; y < h; ++y) {
+    std::uint8_t* out = allowed_.row(y);
+    const std::uint8_t* in = erosion_rows_.row(y);
+    std::copy_n(in, w, out);
+    for (int shift = 1; shift <= std::min(r, w - 1); ++shift) {
+      for (int x = 0; x < w - shift; ++x) out[x] = std::min(out[x], in[x + shift]);
+      for (int x = shift; x < w; ++x) out[x] = std::min(out[x], in[x - shift]);
+    }
+  }
+}
+
+void PixelSelector::select_all_levels(const ImagePyramid& pyramid,
+                                      std::vector<SelectedPixel>* out) {
+  out->clear();
+  for (int level = 0; level < std::min(3, pyramid.num_levels()); ++level) {
+    select_level(pyramid, level, out);
+  }
+}
+
+/// Lays out the blocks of a level and marks those within which a finer level has found a pixel.
+void PixelSelector::inherit_hits(int level, int w, int h) {
+  const std::size_t l = static_cast<std::size_t>(level);
+  blocks_x_[l] = ceil_div(w, block_);
+  blocks_y_[l] = ceil_div(h, block_);
+  hit_[l].assign(static_cast<std::size_t>(blocks_x_[l]) * blocks_y_[l], 0);
+  if (level > 0) {
+    for (int by = 0; by < blocks_y_[l - 1]; ++by) {
+      for (int bx = 0; bx < blocks_x_[l - 1]; ++bx) {
+        const int parent_x = std::min(bx / 2, blocks_x_[l] - 1);
+        const int parent_y = std::min(by / 2, blocks_y_[l] - 1);
+        hit_[l][static_cast<std::size_t>(parent_y * blocks_x_[l] + parent_x)] |=
+            hit_[l - 1][static_cast<std::size_t>(by * blocks_x_[l - 1] + bx)];
+      }
+    }
+  }
+}
+
+/// One pass: a block of 2^level d pixels at level 0 is a block of d pixels at `level`.
+void PixelSelector::select_level(const ImagePyramid& pyramid, int level,
+                                 std::vector<SelectedPixel>* out) {
+  const ImageF& image = pyramid[level];
+  const std::size_t l = static_cast<std::size_t>(level);
+  const int w = image.width();
+  const int h = image.height();
+  const int border = std::max(1, ceil_div(config_.border, 1 << level));
+  inherit_hits(level, w, h);
+  int region_row = -1;
+  for (int by = 0; by < blocks_y_[l]; ++by) {
+    std::uint8_t* hits = hit_[l].data() + static_cast<std::ptrdiff_t>(by) * blocks_x_[l];
+    if (std::all_of(hits, hits + blocks_x_[l], [](std::uint8_t hit) { return hit != 0; })) continue;
+    fill_directions(w);
+    const int y0 = std::max(border, by * block_);
+    const int y1 = std::min(h - border, (by + 1) * block_);
+    for (int y = y0; y < y1; ++y) {
+      const int full_y = y << level;
+      const int row_of_y = ((full_y + 1) * regions_y_ - 1) / pyramid[0].height();
+      if (row_of_y != region_row) fill_thresholds(level, row_of_y, w, pyramid[0].width());
+      region_row = row_of_y;
+      score_row(image, level, y, border, w - border);
+    }
+    for (int bx = 0; bx < blocks_x_[l]; ++bx) {
+      if (hits[bx] != 0) continue;
+      const float* row = best_score_.data();
+      const float* best = std::max_element(row + bx * block_, row + std::min(w, (bx + 1) * block_));
+      if (*best <= 0.0F) continue;
+      const std::ptrdiff_t x = best - row;
+      SelectedPixel pixel;
+      if (!finest_pixel(pyramid[0], level, static_cast<int>(x),
+                        best_y_[static_cast<std::size_t>(x)], &pixel)) {
+        continue;
+      }
+      hits[bx] = 1;
+      out->push_back(pixel);
+    }
+  }
+}
+
+/// Draws one direction a block for a row of blocks, and clears the row's scores.
+void PixelSelector::fill_directions(int width) {
+  static const Directions kDirections = make_directions();
+  const std::size_t size = static_cast<std::size_t>(width);
+  direction_x_.resize(size);
+  direction_y_.resize(size);
+  best_score_.assign(size, 0.0F);
+  best_y_.assign(size, 0);
+  score_row_.resize(size);
+  for (int x0 = 0; x0 < width; x0 += block_) {
+    const std::size_t k = random() % kNumDirections;
+    const int x1 = std::min(width, x0 + block_);
+    std::fill(direction_x_.begin() + x0, direction_x_.begin() + x1, kDirections.x[k]);
+    std::fill(direction_y_.begin() + x0, direction_y_.begin() + x1, kDirections.y[k]);
+  }
+}
+
+/// The squared thresholds of a row of regions, one a column of `level`.
+void PixelSelector::fill_thresholds(int level, int region_row, int width, int full_width) {
+  threshold_row_.resize(static_cast<std::size_t>(width));
+  const double factor =
+      level == 0 ? 1.0 : (level == 1 ? config_.level_threshold_1 : config_.level_threshold_2);
+  const float* row = thresholds_.data() + static_cast<std::ptrdiff_t>(region_row) * regions_x_;
+  for (int rx = 0; rx < regions_x_; ++rx) {
+    const int x0 = std::min(width, region_begin(rx, regions_x_, full_width) >> level);
+    const int x1 = rx + 1 == regions_x_
+                       ? width
+                       : std::min(width, region_begin(rx + 1, regions_x_, full_width) >> level);
+    std::fill(threshold_row_.begin() + x0, threshold_row_.begin() + x1,
+              row[rx] * static_cast<float>(factor));
+  }
+}
+
+/// Updates each column's best |grad I * n| among pixels above the threshold.
+void PixelSelector::score_row(const ImageF& image, int level, int y, int first_x, int last_x) {
+  const float* row = image.row(y);
+  const float* above = row - image.width();
+  const float* below = row + image.width();
+  const float* nx = direction_x_.data();
+  const float* ny = direction_y_.data();
+  const float* threshold = threshold_row_.data();
+  float* score = score_row_.data();
+  for (int x = first_x; x < last_x; ++x) {
+    const float gx = 0.5F * (row[x + 1] - row[x - 1]);
+    const float gy = 0.5F * (below[x] - above[x]);
+    const float along = std::abs(gx * nx[x] + gy * ny[x]);
+    score[x] = gx * gx + gy * gy > threshold[x] ? along : 0.0F;
+  }
+  if (masked_) {
+    const std::uint8_t* allowed = allowed_.row(y << level);
+    for (int x = first_x; x < last_x; ++x) score[x] *= allowed[x << level] != 0 ? 1.0F : 0.0F;
+  }
+  float* best = best_score_.data();
+  std::int32_t* best_y = best_y_.data();
+  for (int x = first_x; x < last_x; ++x) {
+    best_y[x] = score[x] > best[x] ? y : best_y[x];
+    best[x] = std::max(best[x], score[x]);
+  }
+}
+
+/// Among the level-0 pixels that pixel (x, y) of `level` covers, the one of the largest gradient
+/// that border and mask allow.
+bool PixelSelector::finest_pixel(const ImageF& image, int level, int x, int y,
+                                 SelectedPixel* pixel) const {
+  const int border = std::max(1, config_.border);
+  const int side = 1 << level;
+  bool found = false;
+  for (int py = y * side; py < (y + 1) * side; ++py) {
+    for (int px = x * side; px < (x + 1) * side; ++px) {
+      if (px < border || py < border || px >= image.width() - border ||
+          py >= image.height() - border || (masked_ && allowed_.at(px, py) == 0)) {
+        continue;
+      }
+      const float g2 = squared_gradient(image, px, py);
+      if (found && g2 <= pixel->gradient_squared) continue;
+      *pixel = {static_cast<std::int16_t>(px), static_cast<std::int16_t>(py),
+                static_cast<std::uint8_t>(side), g2};
+      found = true;
+    }
+  }
+  return found;
+}
+
+/// Keeps `wanted` pixels, every subset of them equally likely (Knuth, TAOCP 2, algorithm S).
+void PixelSelector::thin(int wanted, std::vector<SelectedPixel>* pixels) {
+  std::size_t kept = 0;
+  std::uint64_t needed = static_cast<std::uint64_t>(wanted);
+  std::uint64_t left = pixels->size();
+  for (const SelectedPixel& pixel : *pixels) {
+    if ((static_cast<std::uint64_t>(random()) * left) >> 32 < needed) {
+      (*pixels)[kept++] = pixel;
+      --needed;
+    }
+    --left;
+  }
+  pixels->resize(kept);
+}
+
+}  // namespace sovo

@@ -188,6 +188,15 @@ std::string_view trim(std::string_view text) {
   return text.substr(begin, text.find_last_not_of(kSpace) - begin + 1);
 }
 
+std::string excerpt(std::string_view text) {
+  std::string out(text.substr(0, 60));
+  for (char& c : out) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte < 0x20 || byte >= 0x7f) c = '?';
+  }
+  return text.size() > 60 ? out + "..." : out;
+}
+
 std::string nearest_word(std::string_view word, const std::vector<std::string>& known) {
   if (word.size() > 200) return {};
   std::size_t best = std::max<std::size_t>(1, word.size() / 3) + 1;

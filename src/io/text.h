@@ -46,6 +46,9 @@ std::vector<std::string_view> split_lines(std::string_view text);
 /// `text` without white space at both ends.
 std::string_view trim(std::string_view text);
 
+/// `text` short and printable enough for a message.
+std::string excerpt(std::string_view text);
+
 /// The one of `known` that `word` is most likely a slip of; empty when none is near.
 std::string nearest_word(std::string_view word, const std::vector<std::string>& known);
 

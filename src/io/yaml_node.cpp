@@ -27,13 +27,4 @@ std::string at_line(const std::string& name, const YAML::Node& node) {
 
 bool is_plain_scalar(const YAML::Node& node) { return node.IsScalar() && node.Tag() != "!"; }
 
-std::string excerpt(const std::string& text) {
-  std::string out = text.substr(0, 60);
-  for (char& c : out) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (byte < 0x20 || byte >= 0x7f) c = '?';
-  }
-  return text.size() > 60 ? out + "..." : out;
-}
-
 }  // namespace sovo

@@ -17,7 +17,4 @@ std::string at_line(const std::string& name, const YAML::Node& node);
 /// Whether the node is a scalar without quotes, as numbers and truth values are written.
 bool is_plain_scalar(const YAML::Node& node);
 
-/// `text` short and printable enough for a message.
-std::string excerpt(const std::string& text);
-
 }  // namespace sovo

@@ -4,6 +4,8 @@
 
 #include <random>
 
+#include "io/io_test_support.h"
+
 namespace sovo {
 namespace {
 
@@ -48,10 +50,6 @@ std::string error_of(const std::string& yaml) {
   Outer config;
   const auto result = load_config_text(yaml, "f.yaml", &config);
   return result ? "" : result.error();
-}
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
 }
 
 TEST(YamlConfig, SetsWhatIsNamedAndKeepsTheRest) {

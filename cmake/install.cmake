@@ -1,6 +1,6 @@
 # The core as an installed library: find_package(sovo) gives sovo::sovo, which links every core
-# room, and each room by its own name (sovo::geometry, ...). The command and its configuration go
-# along when they are built.
+# room, and each room by its own name (sovo::geometry, ...). Where the command is built (src/app installs it),
+# its configuration goes along.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 
@@ -31,6 +31,5 @@ install(FILES ${PROJECT_BINARY_DIR}/sovo-config.cmake
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
 if(TARGET sovo)
-  install(TARGETS sovo RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/config/ DESTINATION ${CMAKE_INSTALL_DATADIR}/sovo)
 endif()

@@ -19,8 +19,9 @@ struct PhotometricCalibration {
 };
 
 /// Raw pixels to float grey levels in [0, 255] (16-bit images are divided by 257), response and
-/// vignette undone, then reduced by the whole number `downscale` (mean of blocks). Pixels at full
-/// scale stay what they are: they carry no information.
+/// vignette undone, then reduced by the whole number `downscale` (mean of blocks). Where the
+/// vignette is dark, values may exceed 255. Pixels at full scale are divided by the vignette like
+/// their neighbours: left at 255 they would draw an edge around every overexposed region.
 /// Precondition: side.valid and the sizes fit.
 void to_float(const SideImage& side, const PhotometricCalibration& calibration, int downscale,
               ImageF* out);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "sovo/geometry/camera_model.h"
+#include "sovo/geometry/types.h"
 #include "sovo/image/image.h"
 
 namespace sovo {
@@ -14,10 +15,10 @@ struct UndistortionConfig {
   }
 };
 
-/// The pinhole camera without distortion that keeps as much as it can of `raw`'s view while every
-/// pixel of the result sees a pixel of the raw image (up to one pixel at the edge), the same
-/// image size, and no more than the configured field of view. A camera without distortion is
-/// returned as it is.
+/// The pinhole camera without distortion, with square pixels (fx = fy), that keeps as much as it
+/// can of `raw`'s view while every pixel of the result sees a pixel of the raw image (up to one
+/// pixel at the edge), the same image size, and no more than the configured field of view. A camera
+/// without distortion is returned as it is.
 CameraModel optimal_pinhole(const CameraModel& raw, const UndistortionConfig& config);
 
 /// Resamples images of `raw` as `pinhole` would see them. The table is made once.
@@ -34,13 +35,22 @@ class Undistorter {
 
   bool is_identity() const { return identity_; }
 
+  /// Where pixel (x, y) of the result comes from in the raw image; (-1, -1) where from nowhere.
+  Vec2 source(int x, int y) const;
+
  private:
+  /// Bilinear interpolation from the raw pixels offset, offset + 1 and the two below them.
+  struct Tap {
+    int offset = -1;  ///< Negative where there is no source.
+    float fx = 0.0F, fy = 0.0F;
+  };
+
   int width_ = 0;
   int height_ = 0;
   int raw_width_ = 0;
   int raw_height_ = 0;
   bool identity_ = false;
-  ImageF map_x_, map_y_;  ///< Source position; negative where there is none.
+  AlignedVector<Tap> taps_;
 };
 
 }  // namespace sovo

@@ -1,0 +1,110 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <utility>
+
+#include "sovo/odometry/stereo_odometry.h"
+
+namespace sovo::app {
+
+/// Sets of values for a purpose; what the user names still wins.
+enum class Preset {
+  kDefault,  ///< Accuracy: 2000 points, 7 keyframes.
+  kFast,     ///< Small computers: 800 points, 6 keyframes.
+};
+
+/// Which implementation of the inner loops runs.
+enum class Kernels {
+  kAuto,    ///< The best one that this machine has.
+  kScalar,  ///< Plain C++.
+};
+
+constexpr std::array<std::pair<Preset, const char*>, 2> enum_names(Preset) {
+  return {{{Preset::kDefault, "default"}, {Preset::kFast, "fast"}}};
+}
+constexpr std::array<std::pair<Kernels, const char*>, 2> enum_names(Kernels) {
+  return {{{Kernels::kAuto, "auto"}, {Kernels::kScalar, "scalar"}}};
+}
+
+/// Where frames come from when they are read from a folder.
+struct CameraSection {
+  std::string path;         ///< Dataset folder.
+  std::string calibration;  ///< Empty: the one that belongs to the dataset.
+  std::string rate = "1.0";
+  bool reverse = false;
+  bool restamp = false;
+  int start = 0;
+  int frames = 0;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("path", path, "dataset folder; its layout is recognised");
+    v("calibration", calibration, "calibration file; empty: the one of the dataset or of the bus");
+    v("rate", rate, "speed of a dataset: 1.0 is real time, max as fast as can be");
+    v("reverse", reverse, "feed the frames backwards, with mirrored stamps");
+    v("restamp", restamp, "shift the stamps so that the first frame is now");
+    v("start", start, "frames left out at the beginning");
+    v("frames", frames, "frames at most; 0: all");
+  }
+};
+
+/// Files that a run leaves; an empty name leaves none.
+struct OutputSection {
+  std::string trajectory;
+  std::string live_trajectory;
+  std::string keyframes;
+  std::string profile;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("trajectory", trajectory, "TUM file of the refined poses");
+    v("live_trajectory", live_trajectory, "TUM file of the poses as published at the time");
+    v("keyframes", keyframes, "CSV file of every scale optimization");
+    v("profile", profile, "JSON file of the times by stage");
+  }
+};
+
+/// How processes find each other.
+struct DdsSection {
+  int domain = -1;
+  std::string network = "lo";
+  std::string name_space = "sovo";
+  std::string camera_name = "cam";
+  bool publish_tf = true;
+  bool accept_commands = false;
+  double idle_exit_s = 0.0;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("domain", domain, "DDS domain; -1: ROS_DOMAIN_ID, else 0");
+    v("network", network, "interface name or address; lo: this machine only");
+    v("namespace", name_space, "prefix of the topics");
+    v("camera_name", camera_name, "prefix of the camera's frames");
+    v("publish_tf", publish_tf, "publish odom -> base_link; false beside another filter");
+    v("accept_commands", accept_commands, "take commands also from beyond this machine");
+    v("idle_exit_s", idle_exit_s, "sovo vo ends when its source is gone this long [s]; 0: never");
+  }
+};
+
+/// The configuration of all processes: one file, a section each.
+struct AppConfig {
+  Preset preset = Preset::kDefault;
+  Kernels kernels = Kernels::kAuto;
+  StereoOdometryConfig odometry;  ///< Its keys stand at the top level of the file.
+  CameraSection camera;
+  OutputSection output;
+  DdsSection dds;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("preset", preset, "values to begin with, before this file's: default, fast");
+    v("kernels", kernels, "implementation of the inner loops");
+    odometry.visit(v);
+    v("camera", camera, "source of frames");
+    v("output", output, "files that a run leaves");
+    v("dds", dds, "how processes find each other");
+  }
+};
+
+}  // namespace sovo::app

@@ -1,0 +1,31 @@
+#include <spdlog/spdlog.h>
+
+#include <iostream>
+#include <memory>
+
+#include "sovo/app/commands.h"
+#include "sovo/app/config_options.h"
+#include "sovo/app/exit_codes.h"
+#include "sovo/io/yaml_config.h"
+
+namespace sovo::app {
+
+void add_config_command(CLI::App& app, int* exit_code) {
+  CLI::App* command = app.add_subcommand(
+      "config",
+      "Print the configuration as YAML with comments: the defaults, or what --config, "
+      "--set and the options make of them");
+  auto options = std::make_shared<ConfigOptions>(command);
+  options->value("--preset", "preset", "Values to begin with", "default|fast");
+  command->callback([options, exit_code] {
+    const auto config = options->load();
+    if (!config) {
+      spdlog::error("{}", config.error());
+      *exit_code = kUsage;
+      return;
+    }
+    std::cout << dump_config(*config);
+  });
+}
+
+}  // namespace sovo::app

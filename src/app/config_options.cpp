@@ -1,0 +1,105 @@
+#include "sovo/app/config_options.h"
+
+#include <spdlog/fmt/fmt.h>
+
+#include "sovo/io/yaml_config.h"
+
+namespace sovo::app {
+namespace {
+
+const CLI::App& root_of(const CLI::App* command) {
+  while (command->get_parent() != nullptr) command = command->get_parent();
+  return *command;
+}
+
+std::vector<std::string> preset_assignments(Preset preset) {
+  if (preset == Preset::kDefault) return {};
+  return {"vo.points.active_points=800", "vo.points.immature_points=600",
+          "vo.keyframe.max_keyframes=6", "vo.keyframe.min_keyframes=4",
+          "vo.window.max_iterations=4"};
+}
+
+Result<void> apply_all(const std::vector<std::string>& assignments, AppConfig* config) {
+  for (const std::string& assignment : assignments) {
+    if (auto set = apply_override(config, assignment); !set) return set;
+  }
+  return {};
+}
+
+}  // namespace
+
+ConfigOptions& ConfigOptions::value(const std::string& name, const std::string& key,
+                                    const std::string& help, const std::string& type) {
+  CLI::Option* option = command_->add_option(name, help);
+  option->expected(1)->type_name(type.empty() ? "VALUE" : type);
+  bindings_.push_back({option, key, false});
+  return *this;
+}
+
+ConfigOptions& ConfigOptions::flag(const std::string& name, const std::string& key,
+                                   const std::string& help) {
+  bindings_.push_back({command_->add_flag(name, help), key, true});
+  return *this;
+}
+
+std::vector<std::string> ConfigOptions::assignments() const {
+  std::vector<std::string> all;
+  const CLI::Option* set = root_of(command_).get_option("--set");
+  for (const std::string& assignment : set->results()) all.push_back(assignment);
+  for (const Binding& b : bindings_) {
+    if (b.option->count() == 0) continue;
+    all.push_back(b.key + "=" + (b.is_flag ? "true" : b.option->results().back()));
+  }
+  return all;
+}
+
+Result<AppConfig> ConfigOptions::load() const {
+  const CLI::Option* file = root_of(command_).get_option("--config");
+  const std::string path = file->count() > 0 ? file->results().back() : "";
+  const auto apply_user = [&](AppConfig* config) -> Result<void> {
+    if (!path.empty()) {
+      if (auto loaded = load_config(path, config); !loaded) return loaded;
+    }
+    return apply_all(assignments(), config);
+  };
+  AppConfig named;  // only to learn which preset the user names
+  if (auto done = apply_user(&named); !done) return done.failure();
+  AppConfig config;
+  if (auto done = apply_all(preset_assignments(named.preset), &config); !done) {
+    return done.failure();
+  }
+  if (auto done = apply_user(&config); !done) return done.failure();
+  return config;
+}
+
+void add_dds_options(ConfigOptions& options) {
+  options.value("--domain", "dds.domain", "DDS domain (else ROS_DOMAIN_ID, else 0)", "N")
+      .value("--network", "dds.network", "Network interface or address (default lo)", "NAME")
+      .value("--ns", "dds.namespace", "Namespace of the topics (default sovo)", "NAME");
+}
+
+void add_dataset_options(ConfigOptions& options) {
+  options
+      .value("--calib", "camera.calibration", "Calibration file, instead of the dataset's", "FILE")
+      .value("--start", "camera.start", "Frames left out at the beginning", "N")
+      .value("--frames", "camera.frames", "Frames at most", "N")
+      .value("--rate", "camera.rate", "Speed: 1.0 is real time, max as fast as can be", "X|max")
+      .flag("--reverse", "camera.reverse", "Feed the frames backwards");
+}
+
+void add_odometry_options(ConfigOptions& options) {
+  options.value("--mode", "mode", "Who owns the metric scale", "mono|scale")
+      .value("--preset", "preset", "Values to begin with", "default|fast")
+      .value("--init", "init", "How the map begins", "auto|stereo|two_view")
+      .value("--depth-init", "depth_init", "A new point's first depth interval", "temporal|stereo")
+      .value("--threads", "threads", "Of the loops inside the stages", "N")
+      .value("--seed", "seed", "Of every random choice", "N")
+      .value("--kernels", "kernels", "Implementation of the inner loops", "auto|scalar")
+      .flag("--deterministic", "deterministic", "All stages in order: same input, same bytes")
+      .value("--out", "output.trajectory", "Write the refined trajectory (TUM)", "FILE")
+      .value("--out-live", "output.live_trajectory", "Write the poses as published (TUM)", "FILE")
+      .value("--keyframes", "output.keyframes", "Write every scale optimization", "FILE.csv")
+      .value("--profile", "output.profile", "Write the times by stage", "FILE.json");
+}
+
+}  // namespace sovo::app

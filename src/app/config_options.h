@@ -1,0 +1,46 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "sovo/app/app_config.h"
+#include "sovo/io/result.h"
+
+namespace sovo::app {
+
+/// Options of a subcommand that stand for keys of the configuration.
+class ConfigOptions {
+ public:
+  explicit ConfigOptions(CLI::App* command) : command_(command) {}
+
+  /// `--name VALUE` sets `key`; `type` is what `--help` shows for the value.
+  ConfigOptions& value(const std::string& name, const std::string& key, const std::string& help,
+                       const std::string& type = "");
+  /// `--name` sets `key` to true.
+  ConfigOptions& flag(const std::string& name, const std::string& key, const std::string& help);
+
+  /// The configuration: defaults, then the preset, `--config`, `--set`, and these options, each
+  /// winning over those before. Call after parsing.
+  Result<AppConfig> load() const;
+
+ private:
+  struct Binding {
+    CLI::Option* option;
+    std::string key;
+    bool is_flag;
+  };
+  std::vector<std::string> assignments() const;
+
+  CLI::App* command_;
+  std::vector<Binding> bindings_;
+};
+
+/// Options of every command that talks to the bus.
+void add_dds_options(ConfigOptions& options);
+/// Options of every command that reads a dataset, but for its path.
+void add_dataset_options(ConfigOptions& options);
+/// Options of every command that runs the odometry.
+void add_odometry_options(ConfigOptions& options);
+
+}  // namespace sovo::app

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "sovo/app/app_config.h"
+#include "sovo/app/profile_report.h"
+#include "sovo/io/result.h"
+
+namespace sovo::app {
+
+/// Brings a stamp that the odometry saw back to the one of the dataset.
+using StampMap = std::function<std::int64_t(std::int64_t)>;
+
+/// Everything that a run leaves.
+struct RunResults {
+  std::vector<TrajectoryPose> refined;
+  const RunRecorder* recorder = nullptr;
+  const ProfileCollector* profile = nullptr;
+  ProfileContext context;
+  StampMap original_stamp;  ///< Empty: stamps are the dataset's already.
+};
+
+/// Whether every file can be written, before hours are spent.
+Result<void> check_outputs(const OutputSection& output);
+
+/// Writes the files that were asked for, lines in ascending order of the dataset's stamps.
+Result<void> write_outputs(const OutputSection& output, const RunResults& results);
+
+}  // namespace sovo::app

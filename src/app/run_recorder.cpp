@@ -1,0 +1,53 @@
+#include "sovo/app/run_recorder.h"
+
+#include <spdlog/spdlog.h>
+
+namespace sovo::app {
+
+void RunRecorder::on_frame(const OdometryOutput& output) {
+  const std::lock_guard lock(mutex_);
+  if (counts_.fed == 0) first_segment_ = output.segment;
+  ++counts_.fed;
+  counts_.tracked += output.pose_valid ? 1 : 0;
+  counts_.lost_segments = output.segment - first_segment_;
+  counts_.rejected = output.rejected;
+  counts_.dropped = output.dropped_queue;
+  counts_.state = to_string(output.state);
+  if (output.pose_valid && keep_.live_poses) {
+    live_.push_back({output.stamp_ns, output.T_odom_left});
+  }
+  if (output.reason != last_reason_ && !output.reason.empty()) {
+    spdlog::info("frame {}: {}: {}", output.sequence, counts_.state, output.reason);
+  }
+  last_reason_ = output.reason;
+}
+
+void RunRecorder::on_keyframe(const KeyframeOutput& keyframe) {
+  const std::lock_guard lock(mutex_);
+  if (counts_.keyframes > 0 && keyframe.id <= newest_keyframe_) return;  // revised
+  newest_keyframe_ = keyframe.id;
+  ++counts_.keyframes;
+}
+
+void RunRecorder::on_scale(const ScaleRecord& record) {
+  const std::lock_guard lock(mutex_);
+  ++counts_.verdicts[to_string(record.verdict)];
+  if (keep_.scale_records) scales_.push_back(record);
+}
+
+RunCounts RunRecorder::counts() const {
+  const std::lock_guard lock(mutex_);
+  return counts_;
+}
+
+std::vector<TrajectoryPose> RunRecorder::live_poses() const {
+  const std::lock_guard lock(mutex_);
+  return live_;
+}
+
+std::vector<ScaleRecord> RunRecorder::scale_records() const {
+  const std::lock_guard lock(mutex_);
+  return scales_;
+}
+
+}  // namespace sovo::app

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <optional>
-#include <vector>
+#include <utility>
 
 #include "sovo/geometry/stereo_rig.h"
 #include "sovo/image/pyramid.h"
@@ -14,7 +14,8 @@ struct StaticMatcherConfig {
   double min_zncc = 0.8;           ///< Least correlation of an accepted match.
   double min_uniqueness = 0.05;    ///< Least lead in ZNCC over the second-best mode.
   double max_back_error_px = 1.0;  ///< Left-right check, at level 0.
-  int coarsest_level = 3;          ///< Where the search over the whole range happens.
+  int coarsest_level = 3;          ///< The search over the whole range is at most this coarse.
+  double min_gradient = 2.0;       ///< Least rms gradient along the curve [grey levels / px].
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -23,7 +24,8 @@ struct StaticMatcherConfig {
     v("min_zncc", min_zncc, "least correlation of an accepted match");
     v("min_uniqueness", min_uniqueness, "least lead in correlation over the second-best match");
     v("max_back_error_px", max_back_error_px, "left-right check [px]");
-    v("coarsest_level", coarsest_level, "pyramid level of the exhaustive search");
+    v("coarsest_level", coarsest_level, "coarsest pyramid level of the search over the range");
+    v("min_gradient", min_gradient, "least rms gradient along the curve [grey levels / px]");
   }
 };
 
@@ -39,11 +41,15 @@ enum class MatchState {
 
 struct StaticMatch {
   MatchState state = MatchState::kOutOfView;
-  float inverse_depth = 0.0F;  ///< 1 / z in the left camera frame [1/m]; sub-pixel refined.
-  float sigma = 0.0F;          ///< Its standard deviation [1/m].
-  float disparity_px = 0.0F;   ///< Displacement in the right image from the point at infinity.
+  /// 1 / z in the left camera frame [1/m]; sub-pixel refined, not negative unless the range
+  /// searched was.
+  float inverse_depth = 0.0F;
+  float sigma = 0.0F;         ///< Its standard deviation [1/m].
+  float disparity_px = 0.0F;  ///< From the image of the point at infinity; negative behind it.
   float zncc = 0.0F;
   float across_px = 0.0F;  ///< Residual displacement across the curve (decalibration).
+  /// Standard deviation of `across_px`; infinite where the texture cannot tell.
+  float across_sigma_px = 0.0F;
 };
 
 /// Matches left pixels in the simultaneous right image along the epipolar curve, by correlation,
@@ -53,7 +59,8 @@ class StaticMatcher {
   StaticMatcher(const StaticMatcherConfig& config, const StereoRig& rig);
 
   /// Matches one left pixel (level 0, sub-pixel). `inverse_depth_range` [min, max] narrows the
-  /// search where something is known.
+  /// search where something is known; a negative range looks behind infinity, where matches mean
+  /// swapped cameras. Thread-safe.
   StaticMatch match(const ImagePyramid& left, const ImagePyramid& right, float u, float v,
                     std::optional<std::pair<float, float>> inverse_depth_range = {}) const;
 

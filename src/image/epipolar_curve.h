@@ -1,0 +1,58 @@
+#pragma once
+
+#include <Eigen/LU>
+#include <optional>
+#include <utility>
+
+#include "sovo/geometry/camera_model.h"
+
+namespace sovo {
+
+/// A point of an epipolar curve, with what a correlation there needs to know.
+struct CurvePoint {
+  Vec2 pixel;             ///< In the target image, level 0.
+  Vec2 derivative;        ///< d pixel / d inverse depth [px m].
+  Mat2 target_from_base;  ///< Small offsets of the base image into the target, surface facing us.
+};
+
+/// Where a pixel of one camera (the base) may appear in another (the target), as a function of
+/// its inverse depth rho: the projection of infinity + rho * slope, whatever the distortion.
+class EpipolarCurve {
+ public:
+  using Mat32 = Eigen::Matrix<double, 3, 2>;
+
+  /// `infinity`: bearing of the pixel rotated into the target frame; rho = 1 / (distance in units
+  /// of its length). `slope`: origin of the base camera in the target frame [m].
+  /// `d_infinity`: derivative of `infinity` by the base pixel.
+  EpipolarCurve(const CameraModel& target, Vec3 infinity, Vec3 slope, Mat32 d_infinity)
+      : target_(&target),
+        infinity_(std::move(infinity)),
+        slope_(std::move(slope)),
+        d_infinity_(std::move(d_infinity)) {}
+
+  /// Nothing where the target camera cannot see the point. rho may be slightly negative.
+  std::optional<CurvePoint> at(double rho) const {
+    Mat23 jacobian;
+    const auto pixel = target_->project(infinity_ + rho * slope_, &jacobian);
+    if (!pixel) return std::nullopt;
+    return CurvePoint{*pixel, jacobian * slope_, jacobian * d_infinity_};
+  }
+
+  const CameraModel& target() const { return *target_; }
+  const Vec3& infinity() const { return infinity_; }
+  const Vec3& slope() const { return slope_; }
+
+ private:
+  const CameraModel* target_;
+  Vec3 infinity_;
+  Vec3 slope_;
+  Mat32 d_infinity_;
+};
+
+/// Pixel of level 0 in the coordinates of pyramid level `level`.
+inline Vec2 to_level(const Vec2& pixel, int level) {
+  const double scale = 1.0 / (1 << level);
+  return {(pixel.x() + 0.5) * scale - 0.5, (pixel.y() + 0.5) * scale - 0.5};
+}
+
+}  // namespace sovo

@@ -110,6 +110,7 @@ struct ScaleEstimate {
   ScaleVerdict verdict = ScaleVerdict::kTooFewPoints;
 };
 
+class RightProjection;
 struct ScaleWorkspace;
 
 /// Finds the metric scale of a keyframe's points by aligning them photometrically with the right
@@ -134,6 +135,7 @@ class ScaleOptimizer {
  private:
   ScaleOptimizerConfig config_;
   StereoRig rig_;
+  std::unique_ptr<RightProjection> projection_;
   std::unique_ptr<ScaleWorkspace> workspace_;
 };
 

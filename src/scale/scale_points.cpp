@@ -1,0 +1,69 @@
+#include "sovo/scale/scale_points.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "sovo/image/interpolation.h"
+
+namespace sovo {
+
+namespace {
+
+bool usable(const KeyframePoints& points, std::size_t i) {
+  return points.inverse_depth[i] > 0.0F && std::isfinite(points.inverse_depth[i]) &&
+         points.sigma[i] >= 0.0F && std::isfinite(points.u[i]) && std::isfinite(points.v[i]);
+}
+
+int padded_size(std::size_t n) {
+  const int lanes = ScalePoints::kLanes;
+  return (static_cast<int>(n) + lanes - 1) / lanes * lanes;
+}
+
+}  // namespace
+
+void ScalePoints::prepare(const KeyframeSnapshot& keyframe, const StereoRig& rig,
+                          double min_relative_sigma) {
+  const KeyframePoints& points = keyframe.points;
+  const auto n = static_cast<std::size_t>(padded_size(points.size()));
+  for (auto* array : {&u, &v, &mx, &my, &mz, &inverse_depth, &relative_variance, &reference}) {
+    array->assign(n, 1.0F);
+  }
+  visible.assign(n, 0.0F);
+  const Mat3 r = rig.T_right_left.rotation_matrix();
+  const Vec3 translation = rig.T_right_left.translation();
+  for (int i = 0; i < 3; ++i) t[i] = static_cast<float>(translation[i]);
+  const CameraModel& camera = keyframe.camera;
+  std::size_t k = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!usable(points, i)) continue;
+    const double x = (static_cast<double>(points.u[i]) - camera.cx) / camera.fx;
+    const double y = (static_cast<double>(points.v[i]) - camera.cy) / camera.fy;
+    u[k] = points.u[i];
+    v[k] = points.v[i];
+    mx[k] = static_cast<float>(r(0, 0) * x + r(0, 1) * y + r(0, 2));
+    my[k] = static_cast<float>(r(1, 0) * x + r(1, 1) * y + r(1, 2));
+    mz[k] = static_cast<float>(r(2, 0) * x + r(2, 1) * y + r(2, 2));
+    inverse_depth[k] = points.inverse_depth[i];
+    const float relative =
+        std::max(points.sigma[i] / points.inverse_depth[i], static_cast<float>(min_relative_sigma));
+    relative_variance[k] = relative * relative;
+    visible[k] = 1.0F;
+    ++k;
+  }
+  size = static_cast<int>(k);
+  padded = padded_size(k);
+}
+
+void ScalePoints::sample_reference(const ImageF& left, int level) {
+  const float factor = 1.0F / static_cast<float>(1 << level);
+  const float offset = 0.5F * factor - 0.5F;
+  const float max_x = static_cast<float>(left.width()) - 1.001F;
+  const float max_y = static_cast<float>(left.height()) - 1.001F;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(size); ++i) {
+    const float x = std::clamp(u[i] * factor + offset, 0.0F, max_x);
+    const float y = std::clamp(v[i] * factor + offset, 0.0F, max_y);
+    reference[i] = sample(left, x, y);
+  }
+}
+
+}  // namespace sovo

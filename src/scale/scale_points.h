@@ -1,0 +1,34 @@
+#pragma once
+
+#include "sovo/geometry/stereo_rig.h"
+#include "sovo/image/image.h"
+#include "sovo/vo/monocular_odometry.h"
+
+namespace sovo {
+
+/// A keyframe's points prepared for projection into the right camera at any scale s = e^sigma, one
+/// array a quantity. With the rotated ray m = R K^-1 (u, v, 1), a point lies at
+/// s m / rho + t in the right camera (paper, eq. 5), in the direction m + (rho / s) t.
+///
+/// Arrays are padded to a multiple of `kLanes` with points that are never visible.
+struct ScalePoints {
+  static constexpr int kLanes = 8;
+
+  int size = 0;                            ///< Points with a usable depth.
+  int padded = 0;                          ///< Length of the arrays.
+  float t[3] = {0.0F, 0.0F, 0.0F};         ///< T_right_left's translation [m].
+  AlignedVector<float> u, v;               ///< In the left image, level 0 [px].
+  AlignedVector<float> mx, my, mz;         ///< Rotated ray of unit depth.
+  AlignedVector<float> inverse_depth;      ///< rho, of unscaled lengths.
+  AlignedVector<float> relative_variance;  ///< (sigma_rho / rho)^2, not below a floor.
+  AlignedVector<float> reference;          ///< Left grey level at the sampled pyramid level.
+  AlignedVector<float> visible;            ///< 1, or 0 where padded or hidden by nearer points.
+
+  /// Takes over the points of a keyframe; those without a positive finite depth are left out.
+  void prepare(const KeyframeSnapshot& keyframe, const StereoRig& rig, double min_relative_sigma);
+
+  /// Samples `reference` from the left image of pyramid level `level`.
+  void sample_reference(const ImageF& left, int level);
+};
+
+}  // namespace sovo

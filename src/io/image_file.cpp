@@ -1,5 +1,6 @@
 #include "sovo/io/image_file.h"
 
+#include <array>
 #include <bit>
 #include <cerrno>
 #include <cstring>

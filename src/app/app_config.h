@@ -4,6 +4,7 @@
 #include <string>
 #include <utility>
 
+#include "sovo/bridge/dds_config.h"
 #include "sovo/odometry/stereo_odometry.h"
 
 namespace sovo::app {
@@ -31,21 +32,25 @@ constexpr std::array<std::pair<Kernels, const char*>, 2> enum_names(Kernels) {
 struct CameraSection {
   std::string path;         ///< Dataset folder.
   std::string calibration;  ///< Empty: the one that belongs to the dataset.
-  std::string rate = "1.0";
+  std::string rate = "auto";
+  std::string name = "cam";
   bool reverse = false;
   bool restamp = false;
   int start = 0;
   int frames = 0;
+  double frame_rate = 20.0;
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v("path", path, "dataset folder; its layout is recognised");
+    v("path", path, "dataset: KITTI odometry, EuRoC, TUM-VI, or folders left/ and right/");
     v("calibration", calibration, "calibration file; empty: the one of the dataset or of the bus");
-    v("rate", rate, "speed of a dataset: 1.0 is real time, max as fast as can be");
+    v("rate", rate, "1.0: real time, max: as fast as can be, auto: 1.0 on the bus, else max");
+    v("name", name, "prefix of the camera's frame names");
     v("reverse", reverse, "feed the frames backwards, with mirrored stamps");
     v("restamp", restamp, "shift the stamps so that the first frame is now");
     v("start", start, "frames left out at the beginning");
     v("frames", frames, "frames at most; 0: all");
+    v("frame_rate", frame_rate, "of images that have no stamps [Hz]");
   }
 };
 
@@ -65,25 +70,15 @@ struct OutputSection {
   }
 };
 
-/// How processes find each other.
-struct DdsSection {
-  int domain = -1;
-  std::string network = "lo";
-  std::string name_space = "sovo";
-  std::string camera_name = "cam";
+/// What only a process on the bus has.
+struct NodeSection {
   bool publish_tf = true;
-  bool accept_commands = false;
   double idle_exit_s = 0.0;
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v("domain", domain, "DDS domain; -1: ROS_DOMAIN_ID, else 0");
-    v("network", network, "interface name or address; lo: this machine only");
-    v("namespace", name_space, "prefix of the topics");
-    v("camera_name", camera_name, "prefix of the camera's frames");
     v("publish_tf", publish_tf, "publish odom -> base_link; false beside another filter");
-    v("accept_commands", accept_commands, "take commands also from beyond this machine");
-    v("idle_exit_s", idle_exit_s, "sovo vo ends when its source is gone this long [s]; 0: never");
+    v("idle_exit_s", idle_exit_s, "sovo vo ends when no frame came this long [s]; 0: never");
   }
 };
 
@@ -94,7 +89,8 @@ struct AppConfig {
   StereoOdometryConfig odometry;  ///< Its keys stand at the top level of the file.
   CameraSection camera;
   OutputSection output;
-  DdsSection dds;
+  NodeSection node;
+  bridge::DdsConfig dds;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -103,6 +99,7 @@ struct AppConfig {
     odometry.visit(v);
     v("camera", camera, "source of frames");
     v("output", output, "files that a run leaves");
+    v("node", node, "what only a process on the bus has");
     v("dds", dds, "how processes find each other");
   }
 };

@@ -1,11 +1,9 @@
-#include <spdlog/spdlog.h>
-
 #include <iostream>
 #include <memory>
 
 #include "sovo/app/commands.h"
 #include "sovo/app/config_options.h"
-#include "sovo/app/exit_codes.h"
+#include "sovo/app/failure.h"
 #include "sovo/io/yaml_config.h"
 
 namespace sovo::app {
@@ -20,8 +18,7 @@ void add_config_command(CLI::App& app, int* exit_code) {
   command->callback([options, exit_code] {
     const auto config = options->load();
     if (!config) {
-      spdlog::error("{}", config.error());
-      *exit_code = kUsage;
+      *exit_code = fail(kUsage, config.error());
       return;
     }
     std::cout << dump_config(*config);

@@ -2,6 +2,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "sovo/app/dataset_input.h"
 #include "sovo/io/yaml_config.h"
 
 namespace sovo::app {
@@ -69,13 +70,27 @@ Result<AppConfig> ConfigOptions::load() const {
     return done.failure();
   }
   if (auto done = apply_user(&config); !done) return done.failure();
+  if (auto done = check_config(config); !done) return done.failure();
   return config;
+}
+
+Result<void> check_config(const AppConfig& config) {
+  const auto& camera = config.camera;
+  if (auto rate = parse_rate(camera.rate, 0.0); !rate) return rate.failure();
+  if (camera.start < 0) return Error{"camera.start must not be negative"};
+  if (camera.frames < 0) return Error{"camera.frames must not be negative"};
+  if (!(camera.frame_rate > 0.0)) return Error{"camera.frame_rate must be positive"};
+  if (config.odometry.threads < 1) return Error{"threads must be at least 1"};
+  if (config.odometry.downscale < 1) return Error{"downscale must be at least 1"};
+  if (config.odometry.mapping_queue < 1) return Error{"mapping_queue must be at least 1"};
+  if (!(config.node.idle_exit_s >= 0.0)) return Error{"node.idle_exit_s must not be negative"};
+  return {};
 }
 
 void add_dds_options(ConfigOptions& options) {
   options.value("--domain", "dds.domain", "DDS domain (else ROS_DOMAIN_ID, else 0)", "N")
       .value("--network", "dds.network", "Network interface or address (default lo)", "NAME")
-      .value("--ns", "dds.namespace", "Namespace of the topics (default sovo)", "NAME");
+      .value("--ns", "dds.ns", "Namespace of the topics (default sovo)", "NAME");
 }
 
 void add_dataset_options(ConfigOptions& options) {

@@ -36,6 +36,9 @@ class ConfigOptions {
   std::vector<Binding> bindings_;
 };
 
+/// Whether the values make sense; `load` asks already.
+Result<void> check_config(const AppConfig& config);
+
 /// Options of every command that talks to the bus.
 void add_dds_options(ConfigOptions& options);
 /// Options of every command that reads a dataset, but for its path.

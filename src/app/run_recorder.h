@@ -18,6 +18,7 @@ struct RunCounts {
   std::uint64_t lost_segments = 0;                ///< Times the track was lost.
   std::uint64_t rejected = 0;                     ///< Frames refused.
   std::uint64_t dropped = 0;                      ///< Frames that mapping had no time for.
+  std::uint32_t queue_depth = 0;                  ///< Frames that wait for mapping.
   std::map<std::string, std::uint64_t> verdicts;  ///< Scale optimizations by verdict.
   std::string state;                              ///< Of the newest frame.
   /// Completion: frames with a valid pose / frames fed.

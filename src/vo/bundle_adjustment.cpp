@@ -1,0 +1,284 @@
+#include "sovo/vo/bundle_adjustment.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/QR>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+#include "sovo/vo/linearization.h"
+
+namespace sovo {
+
+namespace {
+
+// Of the first keyframe: it is the world.
+constexpr double kGaugePose = 1e11;
+constexpr double kGaugeBrightness = 1e10;
+
+void backup(Window* window, const std::vector<PointRef>& points) {
+  for (int i = 0; i < window->size(); ++i) (*window)[i].x_backup = (*window)[i].x;
+  for (const PointRef& ref : points) ref.point->rho_backup = ref.point->rho;
+}
+
+void restore(Window* window, const std::vector<PointRef>& points) {
+  for (int i = 0; i < window->size(); ++i) (*window)[i].set_x((*window)[i].x_backup);
+  for (const PointRef& ref : points) ref.point->rho = ref.point->rho_backup;
+  window->update_geometry();
+}
+
+}  // namespace
+
+FramePrior frame_prior(const Keyframe& k, const WindowConfig& config) {
+  FramePrior prior;
+  prior.weight[6] = config.prior_a;
+  prior.weight[7] = config.prior_b;
+  prior.error[6] = k.affine.a;
+  prior.error[7] = k.affine.b;
+  if (k.id == 0) {
+    prior.weight.head<6>().setConstant(kGaugePose);
+    prior.error.head<6>() = k.x.head<6>();
+    prior.weight.tail<2>().setConstant(kGaugeBrightness);
+  }
+  return prior;
+}
+
+double BundleAdjuster::linearize_all(Window* window, std::vector<PointRef>* points) {
+  const int total = static_cast<int>(points->size());
+  const int num_blocks = (total + kPointBlock - 1) / kPointBlock;
+  std::vector<double> energy(static_cast<std::size_t>(num_blocks), 0.0);
+  pool_->run(num_blocks, [&](int i) {
+    double sum = 0.0;
+    for (int k = i * kPointBlock; k < std::min(total, (i + 1) * kPointBlock); ++k) {
+      const PointRef& ref = (*points)[static_cast<std::size_t>(k)];
+      for (int t = 0; t < window->size(); ++t) {
+        Residual& r = ref.point->residuals[static_cast<std::size_t>((*window)[t].slot)];
+        if (r.state == ResidualState::kAbsent) continue;
+        sum += linearize(*window, config_, ref.host, t, *ref.point, &r);
+      }
+    }
+    energy[static_cast<std::size_t>(i)] = sum;
+  });
+  double total_energy = 0.0;
+  for (const double e : energy) total_energy += e;
+  return total_energy;
+}
+
+double BundleAdjuster::prior_energy(const Window& window) const {
+  const VecX x = window.stacked_x();
+  double energy = x.dot(window.prior().H * x) + 2.0 * window.prior().b.dot(x);
+  for (int i = 0; i < window.size(); ++i) {
+    const FramePrior p = frame_prior(window[i], config_);
+    energy += p.error.dot(p.weight.cwiseProduct(p.error));
+  }
+  return energy;
+}
+
+void BundleAdjuster::accept_states(const std::vector<PointRef>& points, Window* window) const {
+  for (const PointRef& ref : points) {
+    for (int t = 0; t < window->size(); ++t) {
+      Residual& r = ref.point->residuals[static_cast<std::size_t>((*window)[t].slot)];
+      if (r.state == ResidualState::kAbsent || r.state == ResidualState::kOutOfView) continue;
+      r.state = r.new_state;
+      r.energy = r.new_energy;
+    }
+  }
+}
+
+void BundleAdjuster::update_outlier_threshold(Window* window,
+                                              const std::vector<PointRef>& points) const {
+  std::vector<float> energies;
+  energies.reserve(points.size());
+  const auto slot = static_cast<std::size_t>(window->newest().slot);
+  for (const PointRef& ref : points) {
+    const Residual& r = ref.point->residuals[slot];
+    if (r.state != ResidualState::kAbsent && r.new_state != ResidualState::kOutOfView) {
+      energies.push_back(r.raw_energy);
+    }
+  }
+  double& threshold = window->newest().outlier_threshold;
+  if (energies.empty()) {
+    threshold = kPatternSize * config_.outlier_threshold;
+    return;
+  }
+  const auto nth =
+      energies.begin() + static_cast<std::ptrdiff_t>(0.7 * static_cast<double>(energies.size()));
+  std::nth_element(energies.begin(), nth, energies.end());
+  const double e = 13.0 + 0.75 * std::sqrt(static_cast<double>(*nth));
+  threshold = e * e;
+}
+
+VecX BundleAdjuster::state_units(const Window& window) {
+  const double depth = 1.0 / window.mean_inverse_depth();
+  Vec8 unit;
+  unit << Vec3::Constant(0.5 * depth), Vec3::Ones(), 10.0, 1000.0;
+  return unit.replicate(window.size(), 1);
+}
+
+MatX BundleAdjuster::gauge_basis(const Window& window, const VecX& units) {
+  MatX n = MatX::Zero(8 * window.size(), 7);
+  for (int i = 0; i < window.size(); ++i) {
+    const SE3& T = window[i].frozen_T_camera_world;
+    n.block<6, 6>(8 * i, 0) = T.adjoint();
+    n.block<3, 1>(8 * i, 6) = T.translation();
+  }
+  n = units.cwiseInverse().asDiagonal() * n;
+  for (Eigen::Index c = 0; c < n.cols(); ++c) {
+    const double norm = n.col(c).norm();
+    if (norm > 1e-12) n.col(c) /= norm;
+  }
+  const Eigen::JacobiSVD<MatX> svd(n, Eigen::ComputeThinU);
+  const VecX& s = svd.singularValues();
+  Eigen::Index rank = 0;
+  while (rank < s.size() && s[rank] > 1e-5 * s[0]) ++rank;
+  return svd.matrixU().leftCols(rank);
+}
+
+VecX BundleAdjuster::solve(const Window& window, const NormalEquations& system, double lambda,
+                           bool remove_gauge) const {
+  MatX H = system.top + window.prior().H;
+  VecX b = system.b_top + window.prior().b + window.prior().H * window.stacked_x();
+  for (int i = 0; i < window.size(); ++i) {
+    const FramePrior p = frame_prior(window[i], config_);
+    H.diagonal().segment<8>(8 * i) += p.weight;
+    b.segment<8>(8 * i) += p.weight.cwiseProduct(p.error);
+  }
+  H.diagonal() *= 1.0 + lambda;
+  H -= system.schur / (1.0 + lambda);
+  b -= system.b_schur / (1.0 + lambda);
+
+  const VecX units = state_units(window);
+  H = units.asDiagonal() * H * units.asDiagonal();
+  b = units.cwiseProduct(b);
+  const VecX balance = (H.diagonal().array() + 10.0).sqrt().inverse();
+  const MatX balanced = balance.asDiagonal() * H * balance.asDiagonal();
+  VecX y = -(balance.cwiseProduct(balanced.ldlt().solve(balance.cwiseProduct(b))));
+  if (remove_gauge) {
+    const MatX basis = gauge_basis(window, units);
+    y -= basis * (basis.transpose() * y);
+  }
+  return units.cwiseProduct(y);
+}
+
+bool BundleAdjuster::apply_step(Window* window, const std::vector<PointRef>& points, const VecX& dx,
+                                double lambda) const {
+  const int n = window->size();
+  const int total = static_cast<int>(points.size());
+  const int num_blocks = (total + kPointBlock - 1) / kPointBlock;
+  // Relative displacement of each pair: J_x dx of a residual is J_relative times it.
+  std::array<Vec8, static_cast<std::size_t>(kMaxSlots) * kMaxSlots> relative;
+  for (int h = 0; h < n; ++h) {
+    for (int t = 0; t < n; ++t) {
+      if (h == t) continue;
+      relative[static_cast<std::size_t>(h * kMaxSlots + t)] =
+          dx.segment<8>(8 * t) + window->pair(h, t).adjoint_host * dx.segment<8>(8 * h);
+    }
+  }
+  pool_->run(num_blocks, [&](int i) {
+    for (int k = i * kPointBlock; k < std::min(total, (i + 1) * kPointBlock); ++k) {
+      const PointRef& ref = points[static_cast<std::size_t>(k)];
+      Point& p = *ref.point;
+      if (p.hessian <= 1e-10) continue;
+      double b = p.gradient;
+      for (int t = 0; t < n; ++t) {
+        const Residual& r = p.residuals[static_cast<std::size_t>((*window)[t].slot)];
+        if (r.state != ResidualState::kIn) continue;
+        b += Eigen::Map<const Eigen::Matrix<float, 8, 1>>(r.cross.data())
+                 .cast<double>()
+                 .dot(relative[static_cast<std::size_t>(ref.host * kMaxSlots + t)]);
+      }
+      p.rho -= b / (p.hessian * (1.0 + lambda));
+    }
+  });
+  Vec4 sums = Vec4::Zero();  // squared: a, b, rotation, translation
+  for (int i = 0; i < n; ++i) {
+    const Vec8 d = dx.segment<8>(8 * i);
+    sums +=
+        Vec4(d[6] * d[6], d[7] * d[7], d.segment<3>(3).squaredNorm(), d.head<3>().squaredNorm());
+    (*window)[i].set_x((*window)[i].x + d);
+  }
+  window->update_geometry();
+  const Vec4 rms = (sums / n).cwiseSqrt();
+  const double s = config_.stop_threshold;
+  return rms[0] < 5e-3 * s && rms[1] < 0.05 * s && rms[2] < 5e-5 * s &&
+         rms[3] * window->mean_inverse_depth() < 2.5e-5 * s;
+}
+
+void BundleAdjuster::drop_bad_residuals(Window* window) const {
+  const auto newest = static_cast<std::size_t>(window->newest().slot);
+  for (int h = 0; h < window->size(); ++h) {
+    for (Point& p : (*window)[h].points) {
+      if (p.residuals[newest].state != ResidualState::kAbsent) {
+        p.last_but_one_state = p.last_state;
+        p.last_state = p.residuals[newest].state;
+      }
+      for (int t = 0; t < window->size(); ++t) {
+        Residual& r = p.residuals[static_cast<std::size_t>((*window)[t].slot)];
+        if (r.state == ResidualState::kIn) {
+          ++p.good_residuals;
+          const double baseline = window->pair(h, t).distance * p.rho;
+          p.relative_baseline = std::max(p.relative_baseline, static_cast<float>(baseline));
+        } else if (r.state != ResidualState::kAbsent) {
+          r = Residual();
+        }
+      }
+    }
+  }
+}
+
+BundleResult BundleAdjuster::optimize(Window* window) {
+  BundleResult result;
+  std::vector<PointRef> points = collect_points(window);
+  window->update_geometry();
+  double energy = linearize_all(window, &points);
+  update_outlier_threshold(window, points);
+  energy = linearize_all(window, &points) + prior_energy(*window);
+  accept_states(points, window);
+
+  double lambda = config_.damping;
+  const int max_iterations = window->size() < 4 ? 15 : config_.max_iterations;
+  for (int i = 0; i < max_iterations; ++i) {
+    const NormalEquations system = accumulate(*window, points, pool_);
+    backup(window, points);
+    const VecX dx = solve(*window, system, lambda, i >= 2);
+    if (!dx.allFinite()) {
+      result.finite = false;
+      restore(window, points);
+      return result;
+    }
+    const bool small = apply_step(window, points, dx, lambda);
+    ++result.iterations;
+    const double new_energy = linearize_all(window, &points) + prior_energy(*window);
+    if (new_energy < energy) {
+      energy = new_energy;
+      accept_states(points, window);
+      lambda = std::max(config_.damping, lambda * 0.25);
+    } else {
+      restore(window, points);
+      linearize_all(window, &points);
+      lambda *= 100.0;
+    }
+    if (small && i + 1 >= config_.min_iterations) break;
+  }
+
+  window->newest().freeze();
+  window->update_geometry();
+  update_outlier_threshold(window, points);
+  linearize_all(window, &points);
+  accept_states(points, window);
+  const NormalEquations last = accumulate(*window, points, pool_);  // fresh depth information
+  result.residuals = last.residuals;
+  result.points = static_cast<int>(points.size());
+  double residual_energy = 0.0;
+  for (const PointRef& ref : points) {
+    for (const Residual& r : ref.point->residuals) {
+      if (r.state == ResidualState::kIn) residual_energy += r.energy;
+    }
+  }
+  result.rmse = std::sqrt(residual_energy / std::max(1, kPatternSize * result.residuals));
+  result.finite = std::isfinite(result.rmse);
+  drop_bad_residuals(window);
+  return result;
+}
+
+}  // namespace sovo

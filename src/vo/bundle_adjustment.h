@@ -1,0 +1,68 @@
+#pragma once
+
+#include "sovo/vo/direct_config.h"
+#include "sovo/vo/normal_equations.h"
+#include "sovo/vo/window.h"
+#include "sovo/vo/worker_pool.h"
+
+namespace sovo {
+
+/// Weights of the absolute priors on one keyframe's states (translation, rotation, a, b).
+struct FramePrior {
+  Vec8 weight = Vec8::Zero();
+  Vec8 error = Vec8::Zero();  ///< Present value less the value that the prior pulls to.
+};
+
+/// Prior of a keyframe: the first of a map holds the gauge, each holds its brightness near zero.
+FramePrior frame_prior(const Keyframe& keyframe, const WindowConfig& config);
+
+struct BundleResult {
+  double rmse = 0.0;  ///< Of the residuals, an outlier counting its threshold [grey levels].
+  int iterations = 0;
+  int points = 0;
+  int residuals = 0;
+  bool finite = true;  ///< False: the solve broke down; the window must be thrown away.
+};
+
+/// Photometric bundle adjustment over the sliding window by Levenberg-Marquardt: poses,
+/// brightnesses and inverse depths; the intrinsics stay.
+class BundleAdjuster {
+ public:
+  BundleAdjuster(const WindowConfig& config, WorkerPool* pool) : config_(config), pool_(pool) {}
+
+  /// Optimizes, moves the newest keyframe's linearization point to its result, then drops the
+  /// residuals that are outliers or out of view.
+  BundleResult optimize(Window* window);
+
+  /// Energy of all residuals at the current estimate, linearizing them (states unchanged).
+  double linearize_all(Window* window, std::vector<PointRef>* points);
+
+  /// Energy of the marginalization prior and the frame priors.
+  double prior_energy(const Window& window) const;
+
+  /// Gauss-Newton step of the poses (8 a keyframe) for the linearization at hand, without
+  /// changing anything. `remove_gauge` takes the unobservable directions out of the step.
+  VecX solve(const Window& window, const NormalEquations& system, double lambda,
+             bool remove_gauge) const;
+
+  /// Orthonormal basis of the seven gauge directions (motion and scale of the world) at the
+  /// linearization points, in states divided by `state_units`.
+  static MatX gauge_basis(const Window& window, const VecX& state_units);
+
+  /// Units that make the states comparable: translation half the mean depth, rotation 1, a 10,
+  /// b 1000.
+  static VecX state_units(const Window& window);
+
+ private:
+  void accept_states(const std::vector<PointRef>& points, Window* window) const;
+  void update_outlier_threshold(Window* window, const std::vector<PointRef>& points) const;
+  /// Applies the step to poses and, by back-substitution, to depths. True when all are small.
+  bool apply_step(Window* window, const std::vector<PointRef>& points, const VecX& dx,
+                  double lambda) const;
+  void drop_bad_residuals(Window* window) const;
+
+  WindowConfig config_;
+  WorkerPool* pool_;
+};
+
+}  // namespace sovo

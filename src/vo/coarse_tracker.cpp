@@ -1,0 +1,330 @@
+#include "sovo/vo/coarse_tracker.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "sovo/image/interpolation.h"
+
+namespace sovo {
+
+namespace {
+
+constexpr std::array<int, 6> kMaxIterations = {10, 20, 50, 50, 50, 50};
+constexpr double kStartLambda = 0.01;
+constexpr double kMinRejectLambda = 0.001;
+constexpr double kExtrapolationLimit = 0.001;
+constexpr double kStopNorm = 1e-3;
+constexpr double kMaxSaturated = 0.6;
+constexpr double kMaxCutoffFactor = 64.0;
+constexpr double kLevelRejectFactor = 1.5;
+
+using Lane = float __attribute__((vector_size(16)));
+constexpr std::size_t kLanes = 4;
+
+Lane load(const float* p) {
+  Lane v;
+  __builtin_memcpy(&v, p, sizeof(v));
+  return v;
+}
+
+/// Upper triangle of a 9x9 Gram matrix, four lanes each.
+using Accumulator = std::array<Lane, 45>;
+
+void accumulate_row(const std::array<Lane, 9>& row, Lane weight, Accumulator* sums) {
+  std::size_t k = 0;
+  for (std::size_t i = 0; i < 9; ++i) {
+    const Lane wi = weight * row[i];
+    for (std::size_t j = i; j < 9; ++j) (*sums)[k++] += wi * row[j];
+  }
+}
+
+void spill(Accumulator* sums, std::array<double, 45>* total) {
+  for (std::size_t k = 0; k < 45; ++k) {
+    const Lane v = (*sums)[k];
+    (*total)[k] += (static_cast<double>(v[0]) + static_cast<double>(v[1])) +
+                   (static_cast<double>(v[2]) + static_cast<double>(v[3]));
+    (*sums)[k] = Lane{0, 0, 0, 0};
+  }
+}
+
+/// Units that make the eight unknowns comparable in the stop test.
+Vec8 tracker_units(double mean_rho) {
+  Vec8 s;
+  s << Vec3::Constant(0.5 / mean_rho), Vec3::Ones(), 10.0, 1000.0;
+  return s;
+}
+
+}  // namespace
+
+void CoarseTracker::Warped::reserve(std::size_t size) {
+  for (auto* v : {&x, &y, &rho, &gx, &gy, &residual, &weight, &colour}) {
+    if (v->size() < size) v->resize(size);
+  }
+}
+
+double CoarseTracker::residuals(const ReferenceLevel& level, const ImageF& image, const SE3& T,
+                                const BrightnessTransfer& transfer, double cutoff,
+                                Linearization* out) {
+  const Eigen::Matrix3f RKi = (T.rotation_matrix() * level.camera.matrix().inverse()).cast<float>();
+  const Eigen::Vector3f t = T.translation().cast<float>();
+  const auto fx = static_cast<float>(level.camera.fx);
+  const auto fy = static_cast<float>(level.camera.fy);
+  const auto cx = static_cast<float>(level.camera.cx);
+  const auto cy = static_cast<float>(level.camera.cy);
+  const auto gain = static_cast<float>(transfer.gain);
+  const auto bias = static_cast<float>(transfer.bias);
+  const auto huber = static_cast<float>(config_.huber);
+  const auto limit = static_cast<float>(cutoff);
+  const float max_energy = 2.0F * huber * limit - huber * huber;
+  warped_.reserve(level.size() + kLanes);
+  std::size_t n = 0;
+  int in_view = 0;
+  double energy = 0.0;
+  for (std::size_t i = 0; i < level.size(); ++i) {
+    const float u = level.u[i];
+    const float v = level.v[i];
+    const float rho = level.rho[i];
+    const float px = RKi(0, 0) * u + RKi(0, 1) * v + RKi(0, 2) + t.x() * rho;
+    const float py = RKi(1, 0) * u + RKi(1, 1) * v + RKi(1, 2) + t.y() * rho;
+    const float pz = RKi(2, 0) * u + RKi(2, 1) * v + RKi(2, 2) + t.z() * rho;
+    const float iz = 1.0F / pz;
+    const float x = px * iz;
+    const float y = py * iz;
+    const float ku = fx * x + cx;
+    const float kv = fy * y + cy;
+    if (!(pz > 0.0F) || !in_image(image, ku, kv, 1.0F)) continue;
+    const Sample s = sample_with_gradient(image, ku, kv);
+    const float r = s.value - (gain * level.colour[i] + bias);
+    const float magnitude = std::abs(r);
+    ++in_view;
+    if (!(magnitude <= limit)) {
+      energy += max_energy;
+      continue;
+    }
+    const float hw = magnitude < huber ? 1.0F : huber / magnitude;
+    energy += hw * r * r * (2.0F - hw);
+    warped_.x[n] = x;
+    warped_.y[n] = y;
+    warped_.rho[n] = rho * iz;
+    warped_.gx[n] = s.gx * fx;
+    warped_.gy[n] = s.gy * fy;
+    warped_.residual[n] = r;
+    warped_.weight[n] = hw;
+    warped_.colour[n] = level.colour[i];
+    ++n;
+  }
+  warped_.n = n;
+  for (std::size_t i = n; i < n + kLanes; ++i) {  // whole lanes for the normal equations
+    for (auto* a : {&warped_.x, &warped_.y, &warped_.rho, &warped_.gx, &warped_.gy,
+                    &warped_.residual, &warped_.weight, &warped_.colour}) {
+      (*a)[i] = 0.0F;
+    }
+  }
+  out->in_view = in_view;
+  out->inliers = static_cast<int>(n);
+  out->saturated = in_view > 0 ? 1.0 - static_cast<double>(n) / in_view : 1.0;
+  out->energy = in_view > 0 ? energy / in_view : 1e10;
+  return out->energy;
+}
+
+void CoarseTracker::normal_equations(const BrightnessTransfer& transfer, double reference_b,
+                                     Linearization* out) const {
+  Accumulator sums{};
+  std::array<double, 45> total{};
+  const auto gain = static_cast<float>(transfer.gain);
+  const auto b0 = static_cast<float>(reference_b);
+  const Lane one = {1, 1, 1, 1};
+  const Warped& w = warped_;
+  constexpr std::size_t kSpill = 256;
+  for (std::size_t i = 0; i < w.n; i += kLanes) {
+    const Lane x = load(&w.x[i]);
+    const Lane y = load(&w.y[i]);
+    const Lane rho = load(&w.rho[i]);
+    const Lane gx = load(&w.gx[i]);
+    const Lane gy = load(&w.gy[i]);
+    const Lane along = x * gx + y * gy;
+    const std::array<Lane, 9> row = {rho * gx,
+                                     rho * gy,
+                                     -rho * along,
+                                     -(gy + y * along),
+                                     gx + x * along,
+                                     x * gy - y * gx,
+                                     gain * (b0 - load(&w.colour[i])),
+                                     -one,
+                                     load(&w.residual[i])};
+    accumulate_row(row, load(&w.weight[i]), &sums);
+    if (i % kSpill == 0) spill(&sums, &total);
+  }
+  spill(&sums, &total);
+  std::size_t k = 0;
+  for (Eigen::Index i = 0; i < 9; ++i) {
+    for (Eigen::Index j = i; j < 9; ++j, ++k) {
+      if (i < 8 && j < 8) {
+        out->H(i, j) = total[k];
+        out->H(j, i) = total[k];
+      } else if (i < 8) {
+        out->b[i] = total[k];
+      }
+    }
+  }
+}
+
+CoarseTracker::Linearization CoarseTracker::linearize(const TrackingReference& reference, int level,
+                                                      const ImageF& image, const SE3& T,
+                                                      const BrightnessTransfer& transfer,
+                                                      double cutoff) {
+  Linearization out;
+  residuals(reference.levels[static_cast<std::size_t>(level)], image, T, transfer, cutoff, &out);
+  normal_equations(transfer, reference.affine.b, &out);
+  return out;
+}
+
+CoarseTracker::LevelOutcome CoarseTracker::align_level(const TrackingReference& reference,
+                                                       int level, const ImageF& image,
+                                                       double exposure_s, double* cutoff, SE3* T,
+                                                       Affine* affine) {
+  const ReferenceLevel& points = reference.levels[static_cast<std::size_t>(level)];
+  const auto transfer_of = [&](const Affine& a) {
+    return brightness_transfer(reference.affine, reference.exposure_s, a, exposure_s);
+  };
+  const Vec8 units = tracker_units(reference.mean_rho);
+  Vec8 prior = Vec8::Zero();
+  prior[6] = config_.brightness_prior_a;
+  prior[7] = config_.brightness_prior_b;
+  const auto prior_energy = [&](const Affine& a, int in_view) {
+    const double da = a.a - reference.affine.a;
+    const double db = a.b - reference.affine.b;
+    return (prior[6] * da * da + prior[7] * db * db) / std::max(1, in_view);
+  };
+
+  LevelOutcome out;
+  Linearization now;
+  residuals(points, image, *T, transfer_of(*affine), *cutoff, &now);
+  while (now.saturated > kMaxSaturated && *cutoff < config_.cutoff * kMaxCutoffFactor) {
+    *cutoff *= 2.0;
+    residuals(points, image, *T, transfer_of(*affine), *cutoff, &now);
+  }
+  normal_equations(transfer_of(*affine), reference.affine.b, &now);
+  double energy = now.energy + prior_energy(*affine, now.in_view);
+
+  double lambda = kStartLambda;
+  for (int it = 0; it < kMaxIterations[static_cast<std::size_t>(std::min(level, 5))]; ++it) {
+    Mat8 H = now.H;
+    Vec8 b = now.b;
+    H.diagonal() += prior;
+    b[6] += prior[6] * (affine->a - reference.affine.a);
+    b[7] += prior[7] * (affine->b - reference.affine.b);
+    H = units.asDiagonal() * H * units.asDiagonal();
+    b = units.cwiseProduct(b);
+    H.diagonal() *= 1.0 + lambda;
+    Vec8 step = -H.ldlt().solve(b);
+    if (lambda < kExtrapolationLimit) step *= std::sqrt(std::sqrt(kExtrapolationLimit / lambda));
+    if (!step.allFinite()) step.setZero();
+    const Vec8 x = units.cwiseProduct(step);
+
+    const SE3 new_T = SE3::exp(x.head<6>()) * *T;
+    const Affine new_affine{affine->a + x[6], affine->b + x[7]};
+    Linearization next;
+    residuals(points, image, new_T, transfer_of(new_affine), *cutoff, &next);
+    const double new_energy = next.energy + prior_energy(new_affine, next.in_view);
+    if (new_energy < energy) {
+      normal_equations(transfer_of(new_affine), reference.affine.b, &next);
+      now = next;
+      energy = new_energy;
+      *T = new_T;
+      *affine = new_affine;
+      lambda *= 0.5;
+    } else {
+      lambda = std::max(lambda * 4.0, kMinRejectLambda);
+    }
+    if (!(step.norm() > kStopNorm)) break;
+  }
+  out.last = now;
+  out.rmse = std::sqrt(now.energy);
+  out.finite = std::isfinite(out.rmse) && now.in_view > 0;
+  return out;
+}
+
+TrackingResult CoarseTracker::try_hypothesis(const TrackingReference& reference,
+                                             const ImagePyramid& pyramid, double exposure_s,
+                                             const Affine& guess, const SE3& start,
+                                             std::vector<double>* best_rmse) {
+  TrackingResult result;
+  result.T_current_reference = start;
+  result.affine = guess;
+  const int levels = std::min(static_cast<int>(reference.levels.size()), pyramid.num_levels());
+  bool repeated = false;
+  LevelOutcome outcome;
+  for (int l = levels - 1; l >= 0; --l) {
+    double cutoff = config_.cutoff;
+    outcome = align_level(reference, l, pyramid.level(l), exposure_s, &cutoff,
+                          &result.T_current_reference, &result.affine);
+    double& best = (*best_rmse)[static_cast<std::size_t>(l)];
+    if (!outcome.finite || outcome.rmse > kLevelRejectFactor * best) return result;
+    if (cutoff > config_.cutoff && !repeated) {
+      repeated = true;
+      ++l;
+      continue;
+    }
+    best = std::min(best, outcome.rmse);
+  }
+  const Linearization& last = outcome.last;
+  result.rmse = outcome.rmse;
+  result.inliers = last.inliers;
+  result.inlier_ratio = 1.0 - last.saturated;
+  result.view_ratio = static_cast<double>(last.in_view) /
+                      static_cast<double>(std::max<std::size_t>(1, reference.levels[0].size()));
+  result.information = last.H.topLeftCorner<6, 6>();
+  result.good = last.in_view >= 30;
+  return result;
+}
+
+TrackingResult CoarseTracker::track(const TrackingReference& reference, const ImagePyramid& pyramid,
+                                    double exposure_s, const Affine& affine_guess,
+                                    std::span<const SE3> hypotheses, double last_rmse) {
+  std::vector<double> best_rmse(reference.levels.size(), 1e10);
+  TrackingResult best;
+  for (std::size_t i = 0; i < hypotheses.size(); ++i) {
+    TrackingResult tried =
+        try_hypothesis(reference, pyramid, exposure_s, affine_guess, hypotheses[i], &best_rmse);
+    tried.hypothesis = static_cast<int>(i);
+    if (tried.good && (!best.good || tried.rmse < best.rmse)) best = tried;
+    const bool enough = last_rmse <= 0.0 || best.rmse < config_.lost_rmse_factor * last_rmse;
+    if (best.good && enough && best.inlier_ratio > config_.min_inlier_ratio) break;
+  }
+  if (!best.good) return best;
+  best.good = best.rmse < config_.max_rmse && best.inlier_ratio > config_.min_inlier_ratio;
+  measure_flow(reference, best.T_current_reference, &best.flow_translation, &best.flow_total);
+  return best;
+}
+
+void measure_flow(const TrackingReference& reference, const SE3& T, double* translation,
+                  double* total) {
+  const ReferenceLevel& level = reference.levels[0];
+  const CameraModel& c = level.camera;
+  constexpr std::size_t kStride = 32;
+  const Mat3 K = c.matrix();
+  const Mat3 Ki = K.inverse();
+  const Mat3 KRKi = K * T.rotation_matrix() * Ki;
+  double sum_t = 0.0;
+  double sum_total = 0.0;
+  int n = 0;
+  const auto flow = [](const Vec3& p, const Vec3& from) {
+    const double du = p.x() / p.z() - from.x();
+    const double dv = p.y() / p.z() - from.y();
+    return du * du + dv * dv;
+  };
+  for (std::size_t i = 0; i < level.size(); i += kStride) {
+    const Vec3 p(level.u[i], level.v[i], 1.0);
+    const Vec3 kt = K * T.translation() * level.rho[i];
+    sum_t += flow(p + kt, p) + flow(p - kt, p);
+    sum_total += flow(KRKi * p + kt, p) + flow(KRKi * p - kt, p);
+    n += 2;
+  }
+  *translation = n > 0 ? std::sqrt(sum_t / n) : 0.0;
+  *total = n > 0 ? std::sqrt(sum_total / n) : 0.0;
+}
+
+}  // namespace sovo

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "sovo/vo/direct_config.h"
+#include "sovo/vo/tracking_reference.h"
+
+namespace sovo {
+
+/// How a frame was tracked.
+struct TrackingResult {
+  bool good = false;
+  SE3 T_current_reference;
+  Affine affine;              ///< Of the current frame.
+  double rmse = 0.0;          ///< Of the finest level, saturated residuals at the cutoff.
+  double inlier_ratio = 0.0;  ///< Reference pixels in view that are not saturated.
+  double view_ratio = 0.0;    ///< Reference pixels that are in view.
+  int inliers = 0;
+  double flow_translation = 0.0;    ///< RMS flow of the points without the rotation [px].
+  double flow_total = 0.0;          ///< RMS flow of the points [px].
+  Mat6 information = Mat6::Zero();  ///< Of T_current_reference (left perturbation), unit noise.
+  int hypothesis = 0;               ///< Which motion hypothesis was taken.
+};
+
+/// Direct image alignment of a frame with the tracking reference: pose (6) and affine brightness
+/// (2), Levenberg-Marquardt from the coarsest level to the finest (DSO, Sec. 3.1, "frame
+/// tracking").
+class CoarseTracker {
+ public:
+  explicit CoarseTracker(const TrackerConfig& config) : config_(config) {}
+
+  /// Tracks from the first hypothesis on until one is as good as `last_rmse` lets expect; the best
+  /// one counts. `last_rmse` <= 0: nothing is known of it.
+  TrackingResult track(const TrackingReference& reference, const ImagePyramid& pyramid,
+                       double exposure_s, const Affine& affine_guess,
+                       std::span<const SE3> hypotheses, double last_rmse);
+
+  /// One linearization for tests: 8x8 normal matrix, gradient and mean energy at a level.
+  struct Linearization {
+    Mat8 H;
+    Vec8 b;
+    double energy = 0.0;     ///< Mean over the points in view.
+    double saturated = 0.0;  ///< Share of them above the cutoff.
+    int in_view = 0;
+    int inliers = 0;
+  };
+  Linearization linearize(const TrackingReference& reference, int level, const ImageF& image,
+                          const SE3& T_current_reference, const BrightnessTransfer& transfer,
+                          double cutoff);
+
+ private:
+  struct LevelOutcome {
+    double rmse = 0.0;
+    bool finite = true;
+    Linearization last;
+  };
+  double residuals(const ReferenceLevel& level, const ImageF& image, const SE3& T,
+                   const BrightnessTransfer& transfer, double cutoff, Linearization* out);
+  void normal_equations(const BrightnessTransfer& transfer, double reference_b,
+                        Linearization* out) const;
+  LevelOutcome align_level(const TrackingReference& reference, int level, const ImageF& image,
+                           double exposure_s, double* cutoff, SE3* T, Affine* affine);
+  TrackingResult try_hypothesis(const TrackingReference& reference, const ImagePyramid& pyramid,
+                                double exposure_s, const Affine& guess, const SE3& start,
+                                std::vector<double>* best_rmse);
+
+  TrackerConfig config_;
+
+  /// The inliers of the newest residual pass.
+  struct Warped {
+    AlignedVector<float> x, y, rho, gx, gy, residual, weight, colour;
+    std::size_t n = 0;
+    void reserve(std::size_t size);
+  };
+  Warped warped_;
+};
+
+/// RMS flow [px of level 0] of the reference's points under a motion: without its rotation, and
+/// whole (DSO, Sec. 3.1, "keyframe creation").
+void measure_flow(const TrackingReference& reference, const SE3& T_current_reference,
+                  double* translation, double* total);
+
+}  // namespace sovo

@@ -1,0 +1,318 @@
+#include "sovo/vo/direct_odometry.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "sovo/vo/epipolar_search.h"
+#include "sovo/vo/keyframe_policy.h"
+#include "sovo/vo/marginalization.h"
+
+namespace sovo {
+
+namespace {
+
+/// Noise of one pixel of a residual, from which depth information follows [grey levels].
+constexpr double kPixelNoise = 5.0;
+/// A point whose log-depth is known worse than this says nothing about scale.
+constexpr double kMaxRelativeSigma = 0.5;
+constexpr double kMaxBundleRmse = 30.0;
+
+class StageTimer {
+ public:
+  StageTimer(const MapTimer& timer, MapStage stage)
+      : timer_(timer), stage_(stage), start_(std::chrono::steady_clock::now()) {}
+  ~StageTimer() {
+    if (!timer_) return;
+    const std::chrono::duration<double> d = std::chrono::steady_clock::now() - start_;
+    timer_(stage_, d.count());
+  }
+  StageTimer(const StageTimer&) = delete;
+  StageTimer& operator=(const StageTimer&) = delete;
+
+ private:
+  const MapTimer& timer_;
+  MapStage stage_;
+  std::chrono::steady_clock::time_point start_;
+};
+
+PixelSelectorConfig selector_config(int seed) {
+  PixelSelectorConfig config;
+  config.seed = seed + 1;
+  return config;
+}
+
+std::unique_ptr<Keyframe> new_keyframe(std::uint32_t id, const MonoFrame& frame,
+                                       const SE3& T_world_camera, const Affine& affine,
+                                       const WindowConfig& config) {
+  auto k = std::make_unique<Keyframe>();
+  k->id = id;
+  k->stamp_ns = frame.stamp_ns;
+  k->exposure_s = frame.exposure_s;
+  k->pyramid = frame.pyramid;
+  k->frozen_T_camera_world = T_world_camera.inverse();
+  k->frozen_affine = affine;
+  k->set_x(Vec8::Zero());
+  k->outlier_threshold = kPatternSize * config.outlier_threshold;
+  return k;
+}
+
+/// Narrows an immature point's interval to a proposed depth.
+void set_interval(const DepthProposal& depth, double sigmas, ImmaturePoint* p) {
+  if (depth.sigma <= 0.0F) return;
+  const auto half = static_cast<float>(sigmas) * depth.sigma;
+  p->rho_min = std::max(depth.rho - half, 0.0F);
+  p->rho_max = depth.rho + half;
+  p->from_static_match = true;
+}
+
+Point start_point(const ImmaturePoint& immature, const DepthProposal& depth) {
+  Point p;
+  p.u = immature.u;
+  p.v = immature.v;
+  p.type = immature.type;
+  p.colour = immature.colour;
+  p.weight = immature.weight;
+  p.rho = std::max(depth.rho, 1e-5F);
+  p.hessian = std::pow(kPixelNoise / std::max(depth.sigma, 1e-6F), 2);
+  p.last_state = ResidualState::kIn;
+  return p;
+}
+
+}  // namespace
+
+DirectOdometry::DirectOdometry(const DirectConfig& config, const CameraModel& camera,
+                               const ImageU8& mask, int seed, WorkerPool* pool)
+    : config_(config),
+      camera_(camera),
+      mask_(mask),
+      pool_(pool),
+      num_levels_(
+          ImagePyramid::num_levels_for(camera.width, camera.height, config.tracker.max_levels)),
+      window_(camera),
+      selector_(selector_config(seed)),
+      activator_(config.points, config.window, pool),
+      adjuster_(config.window, pool),
+      epoch_log_scale_{0.0},
+      tracker_(config.tracker) {}
+
+std::vector<SelectedPixel> DirectOdometry::select_pixels(const MonoFrame& frame, int wanted) {
+  std::vector<SelectedPixel> pixels;
+  selector_.select(*frame.pyramid, mask_.empty() ? nullptr : &mask_, wanted, &pixels);
+  return pixels;
+}
+
+void DirectOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
+                           const std::vector<StartPoint>& points) {
+  Keyframe& k =
+      window_.insert(new_keyframe(next_id_++, frame, T_world_camera, Affine(), config_.window));
+  for (const StartPoint& s : points) {
+    ImmaturePoint p;
+    if (!make_immature_point(k.image(), s.pixel.x, s.pixel.y, s.pixel.type, config_.points,
+                             config_.window.gradient_constant, &p)) {
+      continue;
+    }
+    if (s.depth.sigma > 0.0F) {
+      k.points.push_back(start_point(p, s.depth));
+    } else {
+      k.immature.push_back(p);
+    }
+  }
+  k.points_hosted = static_cast<int>(k.points.size());
+  window_.update_geometry();
+  record_poses();
+  publish_reference();
+}
+
+MapResult DirectOdometry::map(const TrackedFrame& tracked, const DepthProposer& proposer,
+                              const MapTimer& timer) {
+  // The pose hangs on its reference as that is known now.
+  const auto& reference = *tracked.reference;
+  SE3 T_camera_reference = tracked.tracking.T_current_reference;
+  T_camera_reference.translation() *= std::exp(log_scale_ - reference.log_scale);
+  const SE3 T_world_camera =
+      keyframes_[reference.keyframe_id].T_world_camera * T_camera_reference.inverse();
+  const bool stale = reference.keyframe_id != window_.newest().id;
+  {
+    const StageTimer t(timer, MapStage::kTracing);
+    trace_all(tracked.frame, T_world_camera, tracked.tracking.affine);
+  }
+  if (tracked.wants_keyframe && !stale) {
+    return make_keyframe(tracked, T_world_camera, proposer, timer);
+  }
+  MapResult result;
+  result.active_points = window_.num_active_points();
+  result.keyframes = window_.size();
+  return result;
+}
+
+void DirectOdometry::trace_all(const MonoFrame& frame, const SE3& T_world_camera,
+                               const Affine& affine) {
+  const ImageF& image = frame.pyramid->level(0);
+  constexpr int kBlock = 64;
+  for (int h = 0; h < window_.size(); ++h) {
+    Keyframe& host = window_[h];
+    const HostGeometry geometry =
+        host_geometry(camera_, T_world_camera.inverse() * host.T_world_camera(),
+                      brightness_transfer(host.affine, host.exposure_s, affine, frame.exposure_s));
+    const int total = static_cast<int>(host.immature.size());
+    pool_->run((total + kBlock - 1) / kBlock, [&](int block) {
+      for (int i = block * kBlock; i < std::min(total, (block + 1) * kBlock); ++i) {
+        trace(image, geometry, config_.points, &host.immature[static_cast<std::size_t>(i)]);
+      }
+    });
+  }
+}
+
+MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& T_world_camera,
+                                        const DepthProposer& proposer, const MapTimer& timer) {
+  MapResult result;
+  result.is_keyframe = true;
+  mark_leaving_keyframes(config_.keyframe, &window_);
+  Keyframe& k = window_.insert(new_keyframe(next_id_++, tracked.frame, T_world_camera,
+                                            tracked.tracking.affine, config_.window));
+  for (int h = 0; h + 1 < window_.size(); ++h) {
+    for (Point& p : window_[h].points) {
+      p.residuals[static_cast<std::size_t>(k.slot)].state = ResidualState::kIn;
+    }
+  }
+  window_.update_geometry();
+  {
+    const StageTimer t(timer, MapStage::kBundleAdjustment);
+    activator_.activate(&window_);
+    result.bundle = adjuster_.optimize(&window_);
+  }
+  result.failed =
+      !result.bundle.finite || result.bundle.rmse > kMaxBundleRmse || result.bundle.residuals < 100;
+  if (result.failed) return result;
+
+  for (int h = 0; h < window_.size(); ++h) {
+    for (Point& p : window_[h].points) {
+      p.remove = h + 1 < window_.size() && p.count(ResidualState::kIn) == 0;
+    }
+  }
+  erase_marked_points(&window_);
+  publish_reference();
+  take_snapshot();
+  marginalize(timer);
+  add_immature_points(proposer, timer);
+  record_poses();
+  result.active_points = window_.num_active_points();
+  result.keyframes = window_.size();
+  return result;
+}
+
+void DirectOdometry::marginalize(const MapTimer& timer) {
+  const StageTimer t(timer, MapStage::kMarginalization);
+  record_poses();  // of those that leave now
+  const LeavingPoints leaving = mark_leaving_points(config_.window, &window_);
+  marginalize_points(config_.window, leaving.marginalize, &window_, pool_);
+  erase_marked_points(&window_);
+  for (int i = window_.size() - 1; i >= 0; --i) {
+    if (window_[i].leaving) marginalize_keyframe(config_.window, i, &window_);
+  }
+  window_.update_geometry();
+}
+
+void DirectOdometry::add_immature_points(const DepthProposer& proposer, const MapTimer& timer) {
+  Keyframe& k = window_.newest();
+  std::vector<SelectedPixel> pixels;
+  {
+    const StageTimer t(timer, MapStage::kSelection);
+    selector_.select(*k.pyramid, mask_.empty() ? nullptr : &mask_, config_.points.immature_points,
+                     &pixels);
+  }
+  std::vector<DepthProposal> proposals(pixels.size());
+  if (proposer) {
+    const StageTimer t(timer, MapStage::kStaticMatching);
+    proposer(pixels, &proposals);
+  }
+  k.immature.reserve(pixels.size());
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    ImmaturePoint p;
+    if (!make_immature_point(k.image(), pixels[i].x, pixels[i].y, pixels[i].type, config_.points,
+                             config_.window.gradient_constant, &p)) {
+      continue;
+    }
+    set_interval(proposals[i], config_.points.stereo_interval_sigmas, &p);
+    k.immature.push_back(p);
+  }
+}
+
+void DirectOdometry::record_poses() {
+  for (int i = 0; i < window_.size(); ++i) {
+    const Keyframe& k = window_[i];
+    if (keyframes_.size() <= k.id) keyframes_.resize(k.id + std::size_t{1});
+    KeyframePose& record = keyframes_[k.id];
+    record.id = k.id;
+    if (record.stamp_ns != k.stamp_ns) record.log_scale = log_scale_;
+    record.stamp_ns = k.stamp_ns;
+    record.T_world_camera = k.T_world_camera();
+  }
+}
+
+void DirectOdometry::publish_reference() {
+  auto next = std::make_shared<TrackingReference>(build_tracking_reference(window_, num_levels_));
+  next->log_scale = log_scale_;
+  const std::lock_guard lock(reference_mutex_);
+  reference_ = std::move(next);
+}
+
+std::shared_ptr<const TrackingReference> DirectOdometry::reference() const {
+  const std::lock_guard lock(reference_mutex_);
+  return reference_;
+}
+
+void DirectOdometry::take_snapshot() {
+  const Keyframe& newest = window_.newest();
+  const auto slot = static_cast<std::size_t>(newest.slot);
+  KeyframeSnapshot s;
+  s.id = newest.id;
+  s.stamp_ns = newest.stamp_ns;
+  s.scale_epoch = scale_epoch_;
+  s.log_scale = log_scale_;
+  s.T_world_camera = newest.T_world_camera();
+  s.camera = camera_;
+  s.pyramid = newest.pyramid;
+  for (int h = 0; h + 1 < window_.size(); ++h) {
+    for (const Point& p : window_[h].points) {
+      const Residual& r = p.residuals[slot];
+      if (r.state != ResidualState::kIn || p.hessian <= 0.0 || r.centre_rho <= 0.0F) continue;
+      // Pattern pixels are correlated: half of them count.
+      const double sigma = kPixelNoise * std::sqrt(2.0 / p.hessian);
+      if (sigma > kMaxRelativeSigma * p.rho) continue;
+      const double ratio = r.centre_rho / p.rho;
+      s.points.u.push_back(r.centre_u);
+      s.points.v.push_back(r.centre_v);
+      s.points.inverse_depth.push_back(r.centre_rho);
+      s.points.sigma.push_back(static_cast<float>(sigma * ratio * ratio));
+    }
+  }
+  snapshot_ = std::move(s);
+}
+
+double DirectOdometry::apply(const ScaleCorrection& correction) {
+  const double since = log_scale_ - epoch_log_scale_[correction.scale_epoch];
+  const double log_scale = correction.log_scale - since;
+  const double scale = std::exp(log_scale);
+  const Vec3 centre = window_.newest().T_world_camera().translation();
+  window_.apply_similarity(scale);
+  for (int i = 0; i + 1 < window_.size(); ++i) {
+    KeyframePose& record = keyframes_[window_[i].id];
+    record.later_scale *= scale;
+    record.later_shift = scale * record.later_shift + (1.0 - scale) * centre;
+  }
+  log_scale_ += log_scale;
+  ++scale_epoch_;
+  epoch_log_scale_.push_back(log_scale_);
+  KeyframePose& newest = keyframes_[window_.newest().id];
+  newest.own_log_scale += log_scale;
+  newest.log_scale = log_scale_;
+  record_poses();
+  auto next = std::make_shared<TrackingReference>(rescaled(*reference(), scale));
+  const std::lock_guard lock(reference_mutex_);
+  reference_ = std::move(next);
+  return log_scale;
+}
+
+}  // namespace sovo

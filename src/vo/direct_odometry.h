@@ -1,0 +1,171 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "sovo/vo/bundle_adjustment.h"
+#include "sovo/vo/coarse_tracker.h"
+#include "sovo/vo/direct_config.h"
+#include "sovo/vo/monocular_odometry.h"
+#include "sovo/vo/pixel_selector.h"
+#include "sovo/vo/point_activation.h"
+#include "sovo/vo/window.h"
+#include "sovo/vo/worker_pool.h"
+
+namespace sovo {
+
+/// A frame of the left camera, undistorted and photometrically corrected.
+struct MonoFrame {
+  std::int64_t stamp_ns = 0;
+  double exposure_s = 0.0;  ///< 0: unknown.
+  ImagePyramidPtr pyramid;
+};
+
+/// First depth of a pixel, from wherever it is known.
+struct DepthProposal {
+  float rho = 0.0F;    ///< [1/m]
+  float sigma = 0.0F;  ///< Standard deviation of rho; 0: there is no proposal.
+};
+
+/// Proposes depths for pixels of a frame; `proposals` has the size of `pixels`.
+using DepthProposer = std::function<void(const std::vector<SelectedPixel>& pixels,
+                                         std::vector<DepthProposal>* proposals)>;
+
+/// A point that a map begins with.
+struct StartPoint {
+  SelectedPixel pixel;
+  DepthProposal depth;
+};
+
+/// A frame after tracking, as mapping takes it.
+struct TrackedFrame {
+  MonoFrame frame;
+  TrackingResult tracking;
+  std::shared_ptr<const TrackingReference> reference;
+  SE3 T_world_camera;  ///< With the reference as it was while tracking.
+  bool wants_keyframe = false;
+};
+
+/// What one call of `map` did.
+struct MapResult {
+  bool is_keyframe = false;
+  bool failed = false;  ///< The window broke down; begin anew.
+  BundleResult bundle;
+  int active_points = 0;
+  int keyframes = 0;
+};
+
+/// Parts of the mapping that are timed.
+enum class MapStage { kTracing, kSelection, kStaticMatching, kBundleAdjustment, kMarginalization };
+using MapTimer = std::function<void(MapStage, double seconds)>;
+
+/// A keyframe's pose as the window knows it, or as it was when it left.
+struct KeyframePose {
+  std::uint32_t id = 0;
+  std::int64_t stamp_ns = 0;
+  SE3 T_world_camera;
+  /// Similarities that were applied after this keyframe was the newest one, composed:
+  /// position now = later_scale * (position without them) + later_shift.
+  double later_scale = 1.0;
+  Vec3 later_shift = Vec3::Zero();
+  double own_log_scale = 0.0;  ///< Similarity that was measured on this keyframe.
+  double log_scale = 0.0;      ///< Sum of all similarities applied up to its own.
+};
+
+/// Direct sparse odometry of one camera: tracking of every frame, a sliding window of keyframes,
+/// points and a marginalization prior. Its lengths are in whatever unit the map began with;
+/// `apply` rescales it.
+///
+/// `track` may run on one thread while `map`, `apply` and `snapshot` run on another.
+class DirectOdometry {
+ public:
+  /// `camera`: pinhole without distortion. `mask`: 0 where pixels must not be used (may be empty).
+  DirectOdometry(const DirectConfig& config, const CameraModel& camera, const ImageU8& mask,
+                 int seed, WorkerPool* pool);
+
+  /// Chooses the pixels that a map would begin with.
+  std::vector<SelectedPixel> select_pixels(const MonoFrame& frame, int wanted);
+
+  /// Begins a map with `frame` as first keyframe: points with a depth become active, the others
+  /// immature.
+  void begin(const MonoFrame& frame, const SE3& T_world_camera,
+             const std::vector<StartPoint>& points);
+
+  /// Tracks a frame against the newest reference. `tracking.good` is false when it is lost.
+  TrackedFrame track(const MonoFrame& frame);
+
+  /// Takes a tracked frame into the map: traces the immature points, or makes it a keyframe.
+  MapResult map(const TrackedFrame& tracked, const DepthProposer& proposer, const MapTimer& timer);
+
+  /// The newest keyframe after its bundle adjustment; nothing before the second keyframe.
+  const std::optional<KeyframeSnapshot>& snapshot() const { return snapshot_; }
+
+  /// Applies a measured similarity, less what was applied since its snapshot. Returns the
+  /// log-scale that was applied.
+  double apply(const ScaleCorrection& correction);
+
+  const Window& window() const { return window_; }
+  std::uint64_t scale_epoch() const { return scale_epoch_; }
+  double log_scale() const { return log_scale_; }
+
+  /// Poses of all keyframes of the map, by id.
+  const std::vector<KeyframePose>& keyframes() const { return keyframes_; }
+
+  std::shared_ptr<const TrackingReference> reference() const;
+
+ private:
+  void trace_all(const MonoFrame& frame, const SE3& T_world_camera, const Affine& affine);
+  MapResult make_keyframe(const TrackedFrame& tracked, const SE3& T_world_camera,
+                          const DepthProposer& proposer, const MapTimer& timer);
+  void add_immature_points(const DepthProposer& proposer, const MapTimer& timer);
+  void marginalize(const MapTimer& timer);
+  void publish_reference();
+  void record_poses();
+  void take_snapshot();
+  std::vector<SE3> motion_hypotheses(const TrackingReference& reference) const;
+
+  DirectConfig config_;
+  CameraModel camera_;
+  ImageU8 mask_;
+  WorkerPool* pool_;
+  int num_levels_;
+
+  // Mapping side.
+  Window window_;
+  PixelSelector selector_;
+  PointActivator activator_;
+  BundleAdjuster adjuster_;
+  std::uint32_t next_id_ = 0;
+  std::uint64_t scale_epoch_ = 0;
+  double log_scale_ = 0.0;
+  std::vector<double> epoch_log_scale_;  ///< log_scale_ at each epoch.
+  std::optional<KeyframeSnapshot> snapshot_;
+  std::vector<KeyframePose> keyframes_;
+
+  // Shared: the reference.
+  mutable std::mutex reference_mutex_;
+  std::shared_ptr<const TrackingReference> reference_;
+
+  // Tracking side.
+  CoarseTracker tracker_;
+  struct PastFrame {
+    SE3 T_camera_keyframe;
+    double log_scale = 0.0;
+    std::uint32_t keyframe_id = 0;
+    std::int64_t stamp_ns = 0;
+  };
+  std::vector<PastFrame> past_;  ///< The last two frames, newest last.
+  double expected_steps_ = 1.0;  ///< Time to the new frame over that between the past two.
+  Affine last_affine_;
+  double last_rmse_ = 0.0;
+  double first_rmse_ = 0.0;
+  std::uint32_t first_rmse_keyframe_ = 0;
+  bool has_first_rmse_ = false;
+};
+
+}  // namespace sovo

@@ -1,0 +1,278 @@
+#include "sovo/vo/epipolar_search.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "sovo/image/interpolation.h"
+
+namespace sovo {
+
+namespace {
+
+constexpr float kBorder = 4.0F;
+constexpr int kMaxSteps = 100;
+constexpr int kRefinements = 3;
+constexpr float kMaxRefinement = 0.5F;   // px an iteration
+constexpr float kStopRefinement = 0.1F;  // px
+constexpr int kUniquenessRadius = 2;     // samples around the best that do not count as second
+constexpr float kMaxPixelError = 10.0F;
+constexpr float kPixelErrorBase = 0.2F;
+constexpr float kMinDepthRatio = 0.75F;
+constexpr float kMaxDepthRatio = 1.5F;
+constexpr float kMaxPatternOffset = 2.9F;  // px; within kBorder with the pixels for the gradient
+
+bool inside(const ImageF& image, float u, float v) {
+  return u > kBorder && v > kBorder && u < static_cast<float>(image.width()) - kBorder - 1.0F &&
+         v < static_cast<float>(image.height()) - kBorder - 1.0F;
+}
+
+/// The segment of the image on which the point must lie, and what is needed to come back from a
+/// position on it to inverse depth.
+struct Segment {
+  Eigen::Vector3f ray;  ///< K R K^-1 (u, v, 1).
+  float u_min, v_min;   ///< At rho_min.
+  float u_max, v_max;   ///< At rho_max, or a search length away.
+  float length;
+};
+
+TraceState finish(ImmaturePoint* p, TraceState state) {
+  if (state == TraceState::kOutOfView) p->interval_px = 0.0F;
+  p->state = state;
+  return state;
+}
+
+/// Determines the segment. Returns kUntraced when there is one to search.
+TraceState find_segment(const ImageF& image, const HostGeometry& g, const PointConfig& config,
+                        const ImmaturePoint& p, Segment* s) {
+  s->ray = g.KRKi * Eigen::Vector3f(p.u, p.v, 1.0F);
+  const Eigen::Vector3f near_infinity = s->ray + g.Kt * p.rho_min;
+  if (!(near_infinity.z() > 0.0F)) return TraceState::kOutOfView;
+  s->u_min = near_infinity.x() / near_infinity.z();
+  s->v_min = near_infinity.y() / near_infinity.z();
+  if (!inside(image, s->u_min, s->v_min)) return TraceState::kOutOfView;
+
+  const auto max_search =
+      static_cast<float>(config.max_search) * static_cast<float>(image.width() + image.height());
+  const bool bounded = std::isfinite(p.rho_max);
+  const Eigen::Vector3f far_end = s->ray + g.Kt * (bounded ? p.rho_max : 0.01F + p.rho_min);
+  if (!(far_end.z() > 0.0F)) return TraceState::kOutOfView;
+  s->u_max = far_end.x() / far_end.z();
+  s->v_max = far_end.y() / far_end.z();
+  s->length = std::hypot(s->u_max - s->u_min, s->v_max - s->v_min);
+  if (!bounded) {
+    if (s->length < 1e-6F) return TraceState::kBadCondition;
+    const float scale = max_search / s->length;
+    s->u_max = s->u_min + (s->u_max - s->u_min) * scale;
+    s->v_max = s->v_min + (s->v_max - s->v_min) * scale;
+    s->length = max_search;
+  } else if (s->length < static_cast<float>(config.min_interval_px)) {
+    return TraceState::kSkipped;
+  }
+  if (!inside(image, s->u_max, s->v_max)) return TraceState::kOutOfView;
+  const float depth_ratio = near_infinity.z();  // z_target / z_host for a far point
+  if (p.rho_min > 0.0F && (depth_ratio < kMinDepthRatio || depth_ratio > kMaxDepthRatio)) {
+    return TraceState::kOutOfView;
+  }
+  return TraceState::kUntraced;
+}
+
+using RotatedPattern = std::array<PatternOffset, kPatternSize>;
+
+/// The pattern warped by the upper 2x2 of K R K^-1.
+RotatedPattern rotate_pattern(const Eigen::Matrix3f& m) {
+  RotatedPattern out;
+  for (std::size_t i = 0; i < kPatternSize; ++i) {
+    out[i] = {m(0, 0) * kPattern[i].x + m(0, 1) * kPattern[i].y,
+              m(1, 0) * kPattern[i].x + m(1, 1) * kPattern[i].y};
+  }
+  return out;
+}
+
+bool fits_border(const RotatedPattern& pattern) {
+  return std::all_of(pattern.begin(), pattern.end(), [](const PatternOffset& o) {
+    return std::abs(o.x) < kMaxPatternOffset && std::abs(o.y) < kMaxPatternOffset;
+  });
+}
+
+/// Huber energy of the pattern at (u, v).
+float pattern_energy(const ImageF& image, const RotatedPattern& pattern, const HostGeometry& g,
+                     const ImmaturePoint& p, float huber, float u, float v) {
+  float energy = 0.0F;
+  for (std::size_t i = 0; i < kPatternSize; ++i) {
+    const float x = u + pattern[i].x;
+    const float y = v + pattern[i].y;
+    const float r = sample(image, x, y) - (g.gain * p.colour[i] + g.bias);
+    const float magnitude = std::abs(r);
+    const float hw = magnitude < huber ? 1.0F : huber / magnitude;
+    energy += hw * r * r * (2.0F - hw);
+  }
+  return energy;
+}
+
+/// Gauss-Newton along the line from (*u, *v). Returns the best energy.
+float refine(const ImageF& image, const RotatedPattern& pattern, const HostGeometry& g,
+             const ImmaturePoint& p, float huber, float dx, float dy, float start_energy, float* u,
+             float* v) {
+  float best = start_energy;
+  float best_u = *u;
+  float best_v = *v;
+  float step_back = 0.0F;
+  float factor = 1.0F;
+  for (int it = 0; it < kRefinements; ++it) {
+    if (!inside(image, *u, *v)) break;
+    float H = 1.0F;
+    float b = 0.0F;
+    float energy = 0.0F;
+    for (std::size_t i = 0; i < kPatternSize; ++i) {
+      const Sample s = sample_with_gradient(image, *u + pattern[i].x, *v + pattern[i].y);
+      const float r = s.value - (g.gain * p.colour[i] + g.bias);
+      const float slope = dx * s.gx + dy * s.gy;
+      const float magnitude = std::abs(r);
+      const float hw = magnitude < huber ? 1.0F : huber / magnitude;
+      H += hw * slope * slope;
+      b += hw * r * slope;
+      energy += p.weight[i] * p.weight[i] * hw * r * r * (2.0F - hw);
+    }
+    float step;
+    if (energy > best && it > 0) {
+      factor *= 0.5F;
+      step = factor * step_back;
+      *u = best_u;
+      *v = best_v;
+    } else {
+      best = energy;
+      best_u = *u;
+      best_v = *v;
+      step = std::clamp(-factor * b / H, -kMaxRefinement, kMaxRefinement);
+      step_back = step;
+    }
+    if (!std::isfinite(step)) step = 0.0F;
+    *u += step * dx;
+    *v += step * dy;
+    if (std::abs(step) < kStopRefinement) break;
+  }
+  *u = best_u;
+  *v = best_v;
+  return best;
+}
+
+/// Second-best over best energy outside the neighbourhood of the best.
+float uniqueness(const std::array<float, kMaxSteps>& energies, int n, int best, float best_energy) {
+  float second = 1e10F;
+  for (int i = 0; i < n; ++i) {
+    if (std::abs(i - best) > kUniquenessRadius) {
+      second = std::min(second, energies[static_cast<std::size_t>(i)]);
+    }
+  }
+  return second / std::max(best_energy, 1e-6F);
+}
+
+/// New interval from the position and its pixel error (the axis with more parallax decides).
+void update_interval(const Segment& s, const HostGeometry& g, float u, float v, float dx, float dy,
+                     float error, ImmaturePoint* p) {
+  const bool use_u = dx * dx > dy * dy;
+  const float ray = use_u ? s.ray.x() : s.ray.y();
+  const float kt = use_u ? g.Kt.x() : g.Kt.y();
+  const float centre = use_u ? u : v;
+  const float delta = error * (use_u ? dx : dy);
+  const auto rho_at = [&](float c) { return (s.ray.z() * c - ray) / (kt - g.Kt.z() * c); };
+  p->rho_min = rho_at(centre - delta);
+  p->rho_max = rho_at(centre + delta);
+  if (p->rho_min > p->rho_max) std::swap(p->rho_min, p->rho_max);
+}
+
+}  // namespace
+
+HostGeometry host_geometry(const CameraModel& camera, const SE3& T_target_host,
+                           const BrightnessTransfer& transfer) {
+  const Mat3 K = camera.matrix();
+  HostGeometry g;
+  g.KRKi = (K * T_target_host.rotation_matrix() * K.inverse()).cast<float>();
+  g.Kt = (K * T_target_host.translation()).cast<float>();
+  g.gain = static_cast<float>(transfer.gain);
+  g.bias = static_cast<float>(transfer.bias);
+  return g;
+}
+
+bool make_immature_point(const ImageF& image, float u, float v, std::uint8_t type,
+                         const PointConfig& config, double gradient_constant, ImmaturePoint* out) {
+  if (!in_image(image, u, v, kPatternBorder)) return false;
+  const auto c2 = static_cast<float>(gradient_constant * gradient_constant);
+  ImmaturePoint p;
+  p.u = u;
+  p.v = v;
+  p.type = type;
+  for (std::size_t i = 0; i < kPatternSize; ++i) {
+    const Sample s = sample_with_gradient(image, u + kPattern[i].x, v + kPattern[i].y);
+    if (!std::isfinite(s.value)) return false;
+    p.colour[i] = s.value;
+    p.weight[i] = std::sqrt(c2 / (c2 + s.gx * s.gx + s.gy * s.gy));
+    p.gxx += s.gx * s.gx;
+    p.gxy += s.gx * s.gy;
+    p.gyy += s.gy * s.gy;
+  }
+  p.energy_threshold = static_cast<float>(kPatternSize * config.outlier_energy);
+  *out = p;
+  return true;
+}
+
+TraceState trace(const ImageF& image, const HostGeometry& g, const PointConfig& config,
+                 ImmaturePoint* point) {
+  ImmaturePoint& p = *point;
+  if (p.state == TraceState::kOutOfView) return p.state;
+  Segment s;
+  const TraceState early = find_segment(image, g, config, p, &s);
+  if (early == TraceState::kSkipped) p.interval_px = s.length;
+  if (early != TraceState::kUntraced) return finish(&p, early);
+
+  float dx = (s.u_max - s.u_min) / s.length;
+  float dy = (s.v_max - s.v_min) / s.length;
+  const float along = p.gxx * dx * dx + 2.0F * p.gxy * dx * dy + p.gyy * dy * dy;
+  const float across = p.gxx * dy * dy - 2.0F * p.gxy * dx * dy + p.gyy * dx * dx;
+  float error = kPixelErrorBase + kPixelErrorBase * (along + across) / std::max(along, 1e-6F);
+  if (error * 2.0F > s.length && std::isfinite(p.rho_max)) {
+    p.interval_px = s.length;
+    return finish(&p, TraceState::kBadCondition);
+  }
+  error = std::min(error, kMaxPixelError);
+
+  const auto huber = static_cast<float>(config.huber);
+  const RotatedPattern pattern = rotate_pattern(g.KRKi);
+  if (!fits_border(pattern)) return finish(&p, TraceState::kBadCondition);
+  const int steps = std::min(static_cast<int>(1.9999F + s.length), kMaxSteps - 1);
+  std::array<float, kMaxSteps> energies;
+  int best = -1;
+  float best_energy = 1e10F;
+  for (int i = 0; i < steps; ++i) {
+    const float t = static_cast<float>(i);
+    const float u = s.u_min + t * dx;
+    const float v = s.v_min + t * dy;
+    float energy = 1e5F;
+    if (inside(image, u, v)) energy = pattern_energy(image, pattern, g, p, huber, u, v);
+    energies[static_cast<std::size_t>(i)] = energy;
+    if (energy < best_energy) {
+      best_energy = energy;
+      best = i;
+    }
+  }
+  if (best < 0) return finish(&p, TraceState::kOutOfView);
+  const float quality = uniqueness(energies, steps, best, best_energy);
+  if (quality < p.quality || steps > 10) p.quality = quality;
+
+  float u = s.u_min + static_cast<float>(best) * dx;
+  float v = s.v_min + static_cast<float>(best) * dy;
+  const float refined = refine(image, pattern, g, p, huber, dx, dy, best_energy, &u, &v);
+  if (!(refined < p.energy_threshold * 1.2F)) {
+    const bool twice = p.state == TraceState::kOutlier;
+    return finish(&p, twice ? TraceState::kOutOfView : TraceState::kOutlier);
+  }
+  update_interval(s, g, u, v, dx, dy, error, &p);
+  if (!std::isfinite(p.rho_min) || !std::isfinite(p.rho_max) || p.rho_max < 0.0F) {
+    return finish(&p, TraceState::kOutlier);
+  }
+  p.interval_px = 2.0F * error;
+  return finish(&p, TraceState::kGood);
+}
+
+}  // namespace sovo

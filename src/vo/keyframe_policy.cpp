@@ -1,0 +1,119 @@
+#include "sovo/vo/keyframe_policy.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sovo {
+
+namespace {
+
+constexpr double kFlowUnit = 1120.0;  // width + height of a VGA image, where the weights were tuned
+constexpr int kManyGood = 14;         // good residuals on record of a long-seen point
+constexpr int kFewLeft = 3;
+
+/// Sum over the other keyframes of 1 / distance, times the root of the distance to the newest.
+double distance_score(const Window& window, int i) {
+  double sum = 0.0;
+  for (int j = 0; j < window.size() - 1; ++j) {
+    if (j == i) continue;
+    const double d = window.pair(i, j).distance * window.mean_inverse_depth();
+    sum += 1.0 / (d + 1e-5);
+  }
+  const double to_newest = window.pair(i, window.size() - 1).distance * window.mean_inverse_depth();
+  return std::sqrt(to_newest) * sum;
+}
+
+bool should_leave(const Window& window, const Point& p, int residuals, int surviving) {
+  if (residuals == 0 || p.rho <= 0.0) return true;
+  if (p.last_state == ResidualState::kOutOfView) return true;
+  if (p.last_state == ResidualState::kOutlier && p.last_but_one_state == ResidualState::kOutlier) {
+    return true;
+  }
+  return window.size() > 2 && p.good_residuals > kManyGood && surviving < kFewLeft;
+}
+
+}  // namespace
+
+bool wants_keyframe(const KeyframeConfig& config, const CameraModel& camera,
+                    const TrackingReference& reference, const TrackingResult& tracked,
+                    double exposure_s, double first_rmse) {
+  const double unit = kFlowUnit / (camera.width + camera.height);
+  const BrightnessTransfer transfer =
+      brightness_transfer(reference.affine, reference.exposure_s, tracked.affine, exposure_s);
+  const double score = config.flow_translation * unit * tracked.flow_translation +
+                       config.flow_total * unit * tracked.flow_total +
+                       config.brightness * std::abs(std::log(transfer.gain));
+  return score > 1.0 || tracked.rmse > config.rmse_factor * first_rmse;
+}
+
+void mark_leaving_keyframes(const KeyframeConfig& config, Window* window) {
+  const int n = window->size();
+  int leaving = 0;
+  for (int i = 0; i < n; ++i) {
+    Keyframe& k = (*window)[i];
+    k.leaving = false;
+    if (i == n - 1) continue;
+    const double left = static_cast<double>(k.points.size() + k.immature.size());
+    const double gone = static_cast<double>(k.points_gone);
+    const BrightnessTransfer transfer = brightness_transfer(
+        k.affine, k.exposure_s, window->newest().affine, window->newest().exposure_s);
+    const bool few = left < config.min_points_left * (left + gone);
+    const bool bright = std::abs(std::log(transfer.gain)) > config.max_brightness;
+    if ((few || bright) && n - leaving > config.min_keyframes) {
+      k.leaving = true;
+      ++leaving;
+    }
+  }
+  if (n - leaving < config.max_keyframes) return;
+  double best = -1.0;
+  int best_index = -1;
+  for (int i = 0; i < n - 1; ++i) {
+    if ((*window)[i].leaving || (*window)[i].id == 0) continue;
+    const double score = distance_score(*window, i);
+    if (score > best) {
+      best = score;
+      best_index = i;
+    }
+  }
+  if (best_index >= 0) (*window)[best_index].leaving = true;
+}
+
+LeavingPoints mark_leaving_points(const WindowConfig& config, Window* window) {
+  LeavingPoints out;
+  const double unit = std::pow(window->mean_inverse_depth(), 2);
+  for (int h = 0; h < window->size(); ++h) {
+    Keyframe& host = (*window)[h];
+    for (Point& p : host.points) {
+      int residuals = 0;
+      int surviving = 0;
+      for (int t = 0; t < window->size(); ++t) {
+        const Residual& r = p.residuals[static_cast<std::size_t>((*window)[t].slot)];
+        if (r.state == ResidualState::kAbsent) continue;
+        ++residuals;
+        if (!(*window)[t].leaving) ++surviving;
+      }
+      if (!host.leaving && !should_leave(*window, p, residuals, surviving)) continue;
+      p.remove = true;
+      const bool informative = residuals >= config.min_good_residuals &&
+                               p.good_residuals > config.min_good_residuals && p.rho > 0.0 &&
+                               p.hessian * unit > config.min_relative_information;
+      if (informative) {
+        out.marginalize.push_back({h, &p});
+      } else {
+        ++out.dropped;
+      }
+    }
+  }
+  return out;
+}
+
+void erase_marked_points(Window* window) {
+  for (int h = 0; h < window->size(); ++h) {
+    Keyframe& host = (*window)[h];
+    const std::size_t before = host.points.size();
+    std::erase_if(host.points, [](const Point& p) { return p.remove; });
+    host.points_gone += static_cast<int>(before - host.points.size());
+  }
+}
+
+}  // namespace sovo

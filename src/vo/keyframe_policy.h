@@ -1,0 +1,36 @@
+#pragma once
+
+#include <vector>
+
+#include "sovo/vo/coarse_tracker.h"
+#include "sovo/vo/direct_config.h"
+#include "sovo/vo/normal_equations.h"
+#include "sovo/vo/window.h"
+
+namespace sovo {
+
+/// Whether a tracked frame should become a keyframe. `first_rmse`: of the first frame tracked
+/// against this reference.
+bool wants_keyframe(const KeyframeConfig& config, const CameraModel& camera,
+                    const TrackingReference& reference, const TrackingResult& tracked,
+                    double exposure_s, double first_rmse);
+
+/// Marks the keyframes that are to leave the window when a new one enters: those with few points
+/// left or another brightness, then the one that keeps the others best distributed (DSO, Sec. 3.1,
+/// eq. 20). Call before the new keyframe is inserted.
+void mark_leaving_keyframes(const KeyframeConfig& config, Window* window);
+
+/// Points that leave the window, in two kinds.
+struct LeavingPoints {
+  std::vector<PointRef> marginalize;
+  int dropped = 0;
+};
+
+/// Marks points for removal (`Point::remove`): of leaving hosts, without residuals, behind the
+/// camera, or no longer seen; those with enough information are listed to be marginalized.
+LeavingPoints mark_leaving_points(const WindowConfig& config, Window* window);
+
+/// Erases all points that are marked.
+void erase_marked_points(Window* window);
+
+}  // namespace sovo

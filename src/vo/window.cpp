@@ -1,0 +1,159 @@
+#include "sovo/vo/window.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sovo {
+
+BrightnessTransfer brightness_transfer(const Affine& host, double host_exposure,
+                                       const Affine& target, double target_exposure) {
+  const bool known = host_exposure > 0.0 && target_exposure > 0.0;
+  const double ratio = known ? target_exposure / host_exposure : 1.0;
+  BrightnessTransfer out;
+  out.gain = std::exp(target.a - host.a) * ratio;
+  out.bias = target.b - out.gain * host.b;
+  return out;
+}
+
+void Keyframe::set_x(const Vec8& value) {
+  x = value;
+  T_camera_world = SE3::exp(x.head<6>()) * frozen_T_camera_world;
+  affine.a = frozen_affine.a + x[6];
+  affine.b = frozen_affine.b + x[7];
+}
+
+void Keyframe::freeze() {
+  frozen_T_camera_world = T_camera_world;
+  frozen_affine = affine;
+  x.setZero();
+}
+
+Keyframe& Window::insert(std::unique_ptr<Keyframe> keyframe) {
+  std::array<bool, kMaxSlots> used{};
+  for (const auto& k : keyframes_) used[static_cast<std::size_t>(k->slot)] = true;
+  keyframe->slot = static_cast<int>(std::find(used.begin(), used.end(), false) - used.begin());
+  keyframes_.push_back(std::move(keyframe));
+  renumber();
+
+  const int old = static_cast<int>(prior_.b.size());
+  MatX H = MatX::Zero(old + 8, old + 8);
+  VecX b = VecX::Zero(old + 8);
+  H.topLeftCorner(old, old) = prior_.H;
+  b.head(old) = prior_.b;
+  prior_ = {std::move(H), std::move(b)};
+  return *keyframes_.back();
+}
+
+void Window::erase(int index) {
+  const auto slot = static_cast<std::size_t>(keyframes_[static_cast<std::size_t>(index)]->slot);
+  keyframes_.erase(keyframes_.begin() + index);
+  for (auto& k : keyframes_) {
+    for (Point& p : k->points) p.residuals[slot] = Residual();
+  }
+  renumber();
+}
+
+void Window::renumber() {
+  slot_index_.fill(-1);
+  for (int i = 0; i < size(); ++i) slot_index_[static_cast<std::size_t>((*this)[i].slot)] = i;
+}
+
+int Window::index_of(std::uint32_t id) const {
+  for (int i = 0; i < size(); ++i) {
+    if ((*this)[i].id == id) return i;
+  }
+  return -1;
+}
+
+void Window::update_geometry() {
+  const Eigen::Matrix3f K = camera_.matrix().cast<float>();
+  const Mat3 K_inverse = camera_.matrix().inverse();
+  for (int h = 0; h < size(); ++h) {
+    for (int t = 0; t < size(); ++t) {
+      if (h == t) continue;
+      const Keyframe& host = (*this)[h];
+      const Keyframe& target = (*this)[t];
+      PairGeometry& g = pairs_[static_cast<std::size_t>(h * kMaxSlots + t)];
+      const SE3 T = target.T_camera_world * host.T_camera_world.inverse();
+      g.RKi = (T.rotation_matrix() * K_inverse).cast<float>();
+      g.t = T.translation().cast<float>();
+      g.KRKi = K * g.RKi;
+      g.Kt = K * g.t;
+      g.distance = T.translation().norm();
+
+      const SE3 T0 = target.frozen_T_camera_world * host.frozen_T_camera_world.inverse();
+      g.frozen_RKi = (T0.rotation_matrix() * K_inverse).cast<float>();
+      g.frozen_t = T0.translation().cast<float>();
+
+      const BrightnessTransfer now =
+          brightness_transfer(host.affine, host.exposure_s, target.affine, target.exposure_s);
+      const BrightnessTransfer frozen = brightness_transfer(
+          host.frozen_affine, host.exposure_s, target.frozen_affine, target.exposure_s);
+      g.gain = static_cast<float>(now.gain);
+      g.bias = static_cast<float>(now.bias);
+      g.frozen_gain = static_cast<float>(frozen.gain);
+      g.frozen_host_b = static_cast<float>(host.frozen_affine.b);
+
+      // exp(x_t) T0 exp(-x_h) = exp(x_t - Ad_T0 x_h + ...) T0; log-gain a_t - a_h; bias
+      // b_t - gain * b_h.
+      g.adjoint_host.setZero();
+      g.adjoint_host.topLeftCorner<6, 6>() = -T0.adjoint();
+      g.adjoint_host(6, 6) = -1.0;
+      g.adjoint_host(7, 7) = -frozen.gain;
+    }
+  }
+}
+
+VecX Window::stacked_x() const {
+  VecX x(8 * size());
+  for (int i = 0; i < size(); ++i) x.segment<8>(8 * i) = (*this)[i].x;
+  return x;
+}
+
+int Window::num_active_points() const {
+  int n = 0;
+  for (const auto& k : keyframes_) n += static_cast<int>(k->points.size());
+  return n;
+}
+
+double Window::mean_inverse_depth() const {
+  double sum = 0.0;
+  int n = 0;
+  for (const auto& k : keyframes_) {
+    for (const Point& p : k->points) {
+      sum += p.rho;
+      ++n;
+    }
+  }
+  return n > 0 && sum > 0.0 ? sum / n : 1.0;
+}
+
+void Window::apply_similarity(double scale) {
+  const Vec3 centre = newest().T_world_camera().translation();
+  Vec8 s;
+  s << scale, scale, scale, 1, 1, 1, 1, 1;
+  const auto rho_scale = static_cast<float>(1.0 / scale);
+  for (auto& k : keyframes_) {
+    SE3& T0 = k->frozen_T_camera_world;
+    T0.translation() = scale * T0.translation() - (1.0 - scale) * (T0.rotation() * centre);
+    k->set_x(s.asDiagonal() * k->x);
+    for (Point& p : k->points) {
+      p.rho /= scale;
+      p.hessian *= scale * scale;
+      p.gradient *= scale;
+      for (Residual& r : p.residuals) r.centre_rho *= rho_scale;
+    }
+    for (ImmaturePoint& p : k->immature) {
+      p.rho_min *= rho_scale;
+      p.rho_max *= rho_scale;
+    }
+  }
+  for (int i = 0; i < size(); ++i) {
+    prior_.H.middleRows<3>(8 * i) /= scale;
+    prior_.H.middleCols<3>(8 * i) /= scale;
+    prior_.b.segment<3>(8 * i) /= scale;
+  }
+  update_geometry();
+}
+
+}  // namespace sovo

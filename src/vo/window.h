@@ -1,0 +1,194 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "sovo/geometry/camera_model.h"
+#include "sovo/geometry/se3.h"
+#include "sovo/image/pyramid.h"
+#include "sovo/vo/immature_point.h"
+#include "sovo/vo/pattern.h"
+
+namespace sovo {
+
+/// Affine brightness of a frame: its grey levels are exp(a) * (true) + b.
+struct Affine {
+  double a = 0.0;
+  double b = 0.0;
+};
+
+/// Brightness from a host to a target image: I_target ~ gain * I_host + bias.
+struct BrightnessTransfer {
+  double gain = 1.0;
+  double bias = 0.0;
+};
+
+/// Transfer between two frames; the exposure times count when both are known (> 0).
+BrightnessTransfer brightness_transfer(const Affine& host, double host_exposure,
+                                       const Affine& target, double target_exposure);
+
+enum class ResidualState : std::uint8_t {
+  kAbsent,     ///< No residual into this keyframe.
+  kIn,         ///< Takes part.
+  kOutlier,    ///< Energy above the threshold; may come back.
+  kOutOfView,  ///< Left the target image; stays out.
+};
+
+/// Photometric residual of a point's pattern in one target keyframe, and its linearization in
+/// compact form. With the pattern's Jacobian rows J_i = [g_i^T D, ja_i, jb_i] (image gradient g_i,
+/// geometric Jacobian D at the centre pixel, brightness), all that the normal equations need is
+/// the 4x4 Gram matrix of (gx, gy, ja, jb), its product with r, and D.
+struct Residual {
+  ResidualState state = ResidualState::kAbsent;
+  ResidualState new_state = ResidualState::kAbsent;  ///< Of the newest linearization.
+  float energy = 0.0F;                               ///< Accepted; outliers count their threshold.
+  float new_energy = 0.0F;
+  float raw_energy = 0.0F;  ///< As measured, outlier or not.
+
+  std::array<float, 10> gram{};     ///< Upper triangle of sum [gx gy ja jb]^T [gx gy ja jb].
+  std::array<float, 4> gram_r{};    ///< sum [gx gy ja jb]^T r.
+  float rr = 0.0F;                  ///< sum r^2 (weighted).
+  std::array<float, 6> du{}, dv{};  ///< d (u, v) / d (relative pose): translation, rotation [px].
+  float du_rho = 0.0F, dv_rho = 0.0F;  ///< d (u, v) / d (inverse depth) [px m].
+  std::array<float, 8> cross{};        ///< J_pose^T J_rho of this residual, relative coordinates.
+
+  float centre_u = 0.0F, centre_v = 0.0F;  ///< Projection of the centre pixel [px].
+  float centre_rho = 0.0F;                 ///< Inverse depth in the target [1/m].
+};
+
+/// A point of the window: inverse depth along the ray of a pixel of its host keyframe.
+struct Point {
+  float u = 0.0F, v = 0.0F;                  ///< In the host's level 0 [px].
+  std::array<float, kPatternSize> colour{};  ///< Host grey levels of the pattern.
+  std::array<float, kPatternSize> weight{};  ///< Gradient weights of the pattern.
+  std::uint8_t type = 1;                     ///< Block size of the selection: 1, 2, 4.
+  double rho = 0.0;                          ///< Inverse depth, current estimate [1/m].
+  double rho_backup = 0.0;
+  double step = 0.0;
+  double hessian = 0.0;            ///< H_rho_rho of the newest linearization, without priors.
+  double gradient = 0.0;           ///< b_rho.
+  float relative_baseline = 0.0F;  ///< Largest baseline * rho of its good residuals.
+  int good_residuals = 0;          ///< Inlier residuals on record, counted at every keyframe.
+  bool remove = false;
+  std::array<Residual, kMaxSlots> residuals{};  ///< By target slot.
+  /// States in the newest keyframe and the one before (for the rules of removal).
+  ResidualState last_state = ResidualState::kAbsent;
+  ResidualState last_but_one_state = ResidualState::kAbsent;
+
+  int count(ResidualState s) const {
+    int n = 0;
+    for (const Residual& r : residuals) n += r.state == s ? 1 : 0;
+    return n;
+  }
+};
+
+/// A keyframe of the window. Its pose and brightness are a frozen linearization point and a
+/// displacement x = (translation, rotation, a, b): T_camera_world = exp(x) * frozen
+/// (first-estimates Jacobians).
+struct Keyframe {
+  std::uint32_t id = 0;
+  int slot = 0;  ///< Index of the residuals into this keyframe, stable for its life.
+  std::int64_t stamp_ns = 0;
+  double exposure_s = 0.0;
+  ImagePyramidPtr pyramid;
+
+  SE3 frozen_T_camera_world;
+  Affine frozen_affine;
+  Vec8 x = Vec8::Zero();
+  Vec8 x_backup = Vec8::Zero();
+  SE3 T_camera_world;  ///< exp(x) * frozen.
+  Affine affine;       ///< frozen + x.
+
+  double outlier_threshold = 0.0;  ///< Energy of a whole pattern.
+  int points_hosted = 0;           ///< Ever active points of this host.
+  int points_gone = 0;             ///< Of them, marginalized or dropped.
+  bool leaving = false;
+
+  std::vector<Point> points;
+  std::vector<ImmaturePoint> immature;
+
+  const ImageF& image() const { return pyramid->level(0); }
+  SE3 T_world_camera() const { return T_camera_world.inverse(); }
+  /// Sets the displacement and what follows from it.
+  void set_x(const Vec8& value);
+  /// Moves the linearization point to the current estimate; x becomes zero.
+  void freeze();
+};
+
+/// The marginalization prior: a quadratic energy of the displacements of all keyframes of the
+/// window, in their order: E = x^T H x + 2 b^T x, eight states a keyframe.
+struct Prior {
+  MatX H;
+  VecX b;
+};
+
+/// Precomputed relation of a host and a target keyframe.
+struct PairGeometry {
+  Eigen::Matrix3f KRKi, RKi;  ///< Current pose.
+  Eigen::Vector3f Kt, t;
+  Eigen::Matrix3f frozen_RKi;  ///< At the linearization points.
+  Eigen::Vector3f frozen_t;
+  float gain = 1.0F, bias = 0.0F;  ///< Current brightness transfer.
+  float frozen_gain = 1.0F;
+  float frozen_host_b = 0.0F;
+  Mat8 adjoint_host;      ///< d (relative state) / d x_host; that of x_target is the identity.
+  double distance = 0.0;  ///< Between the camera centres [m].
+};
+
+/// The sliding window: keyframes from oldest to newest, the prior, and the geometry of each pair.
+class Window {
+ public:
+  explicit Window(const CameraModel& camera) : camera_(camera) {}
+
+  const CameraModel& camera() const { return camera_; }
+  int size() const { return static_cast<int>(keyframes_.size()); }
+  bool empty() const { return keyframes_.empty(); }
+  Keyframe& operator[](int i) { return *keyframes_[static_cast<std::size_t>(i)]; }
+  const Keyframe& operator[](int i) const { return *keyframes_[static_cast<std::size_t>(i)]; }
+  Keyframe& newest() { return *keyframes_.back(); }
+  const Keyframe& newest() const { return *keyframes_.back(); }
+
+  /// Appends a keyframe, gives it a free slot and zero rows in the prior. Returns it.
+  Keyframe& insert(std::unique_ptr<Keyframe> keyframe);
+  /// Removes keyframe `index` and all residuals into it. The prior must have lost its rows.
+  void erase(int index);
+
+  Prior& prior() { return prior_; }
+  const Prior& prior() const { return prior_; }
+
+  /// Index in the window of the keyframe with this id, or -1.
+  int index_of(std::uint32_t id) const;
+  /// Index in the window of the keyframe in a slot, or -1.
+  int index_of_slot(int slot) const { return slot_index_[static_cast<std::size_t>(slot)]; }
+
+  /// Recomputes the geometry of all pairs from the current states.
+  void update_geometry();
+  const PairGeometry& pair(int host, int target) const {
+    return pairs_[static_cast<std::size_t>(host * kMaxSlots + target)];
+  }
+
+  /// Displacements of all keyframes, stacked (8 a keyframe).
+  VecX stacked_x() const;
+
+  int num_active_points() const;
+  /// Mean inverse depth of the active points; 1 when there are none [1/m].
+  double mean_inverse_depth() const;
+
+  /// Applies the similarity p -> centre + scale * (p - centre), the centre being the newest
+  /// keyframe's: poses, inverse depths, immature intervals, linearization points, the prior with
+  /// its displacement. The photometric energy does not change.
+  void apply_similarity(double scale);
+
+ private:
+  void renumber();
+
+  CameraModel camera_;
+  std::vector<std::unique_ptr<Keyframe>> keyframes_;
+  std::array<int, kMaxSlots> slot_index_{};
+  Prior prior_;
+  std::array<PairGeometry, static_cast<std::size_t>(kMaxSlots) * kMaxSlots> pairs_;
+};
+
+}  // namespace sovo

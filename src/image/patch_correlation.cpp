@@ -19,6 +19,8 @@ constexpr int kHalfAcross = kPatchAcross / 2;
 constexpr int kNodeSteps = 4;      ///< Steps between exact projections.
 constexpr int kSegmentSteps = 24;  ///< Steps that share one warp of the base patch.
 constexpr double kMinSpeed = 1e-6;
+constexpr double kMaxShear = 0.6;       ///< Displacement along the curve a row across [px].
+constexpr double kShearPrior = 2500.0;  ///< Residuals of 5 grey levels against 0.1 px a row.
 
 bool readable(const ImageF& image, const Vec2f& p) {
   return p.x() >= 0.0F && p.y() >= 0.0F && p.x() < static_cast<float>(image.width() - 1) &&
@@ -233,11 +235,12 @@ bool correlate(const PatchSearch& search, int level, double rho_min, double rho_
 
 namespace {
 
-/// The base patch at level 0 with its derivatives along and across the curve, means removed, and
-/// the normal matrix of (gain, displacement along, displacement across).
+/// The base patch at level 0 with its derivatives, means removed, and the normal matrix of (gain,
+/// displacement along the curve, shear, displacement across). Shear is displacement along a row
+/// across: the ground, seen from a car, moves by a third of a pixel a row.
 struct Template {
-  Patch value, along, across;
-  Mat3 normal;
+  Patch value, along, shear, across;
+  Mat4 normal;
   Mat2f axes;  ///< Along and across in the target image.
 };
 
@@ -258,56 +261,67 @@ bool make_template(const PatchSearch& search, const CurvePoint& point, Template*
       const auto k = static_cast<std::size_t>(i * kPatchAcross + j);
       out->value[k] = g[0];
       out->along[k] = 0.5F * (g[kColumn] - g[-kColumn]);
+      out->shear[k] = static_cast<float>(j - kHalfAcross) * out->along[k];
       out->across[k] = 0.5F * (g[1] - g[-1]);
     }
   }
   remove_mean(&out->value);
   remove_mean(&out->along);
+  remove_mean(&out->shear);
   remove_mean(&out->across);
-  const std::array<const Patch*, 3> columns = {&out->value, &out->along, &out->across};
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) {
-      out->normal(i, j) = static_cast<double>(dot(columns[static_cast<std::size_t>(i)]->data(),
-                                                  columns[static_cast<std::size_t>(j)]->data()));
+  const std::array<const Patch*, 4> columns = {&out->value, &out->along, &out->shear, &out->across};
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    for (std::size_t j = 0; j <= i; ++j) {
+      out->normal(i, j) = out->normal(j, i) =
+          static_cast<double>(dot(columns[i]->data(), columns[j]->data()));
     }
   }
+  out->normal(2, 2) += kShearPrior;
   return true;
 }
 
+/// Where and how the target is sampled: moved during the alignment.
+struct Placement {
+  Vec2 pixel;
+  double shear = 0.0;
+};
+
 /// Least squares of the target patch on the template: target = gain * (value + d_along * along +
-/// d_across * across) + bias, inverse-compositional (the normal matrix stays).
+/// shear * row * along + d_across * across) + bias, inverse-compositional (the normal matrix
+/// stays).
 struct Fit {
-  double gain = 0.0;
-  Vec2 displacement = Vec2::Zero();  ///< Of the target patch from where it fits best [px].
-  double residual_variance = 0.0;    ///< In grey levels of the base, squared.
+  double along = 0.0, shear = 0.0, across = 0.0;  ///< Of the target from where it fits best [px].
+  double residual_variance = 0.0;                 ///< In grey levels of the base, squared.
   double zncc = 0.0;
 };
 
-bool fit(const PatchSearch& search, const Template& base, const Vec2& pixel, bool both, Fit* out) {
+bool fit(const PatchSearch& search, const Template& base, const Placement& at, bool both,
+         Fit* out) {
   Patch target;
-  if (!sample_grid<kHalfAlong, kHalfAcross>(search.target->level(0), pixel.cast<float>(), base.axes,
+  Mat2f axes = base.axes;
+  axes.col(1) += static_cast<float>(at.shear) * axes.col(0);
+  if (!sample_grid<kHalfAlong, kHalfAcross>(search.target->level(0), at.pixel.cast<float>(), axes,
                                             target.data())) {
     return false;
   }
   remove_mean(&target);
-  const Vec3 b(static_cast<double>(dot(base.value.data(), target.data())),
+  const Vec4 b(static_cast<double>(dot(base.value.data(), target.data())),
                static_cast<double>(dot(base.along.data(), target.data())),
+               static_cast<double>(dot(base.shear.data(), target.data())),
                static_cast<double>(dot(base.across.data(), target.data())));
-  Vec3 x = Vec3::Zero();
+  Vec4 x = Vec4::Zero();
   if (both) {
     x = base.normal.ldlt().solve(b);
   } else {
-    const Mat2 n = base.normal.topLeftCorner<2, 2>();
-    const double det = n.determinant();
-    if (det < 1e-9 * n(0, 0) * n(0, 0)) return false;
-    x.head<2>() = n.inverse() * b.head<2>();
+    x.head<3>() = base.normal.topLeftCorner<3, 3>().inverse() * b.head<3>();
   }
-  if (!(x[0] > 1e-3)) return false;
+  if (!(x[0] > 1e-3) || !x.allFinite()) return false;
   const double energy = static_cast<double>(dot(target.data(), target.data()));
-  out->gain = x[0];
-  out->displacement = x.tail<2>() / x[0];
+  out->along = x[1] / x[0];
+  out->shear = x[2] / x[0];
+  out->across = x[3] / x[0];
   out->residual_variance =
-      std::max(0.0, energy - x.dot(b)) / (kPatchSize - (both ? 4 : 3)) / (x[0] * x[0]);
+      std::max(0.0, energy - x.dot(b)) / (kPatchSize - (both ? 5 : 4)) / (x[0] * x[0]);
   out->zncc = b[0] / std::sqrt(std::max(1e-9, base.normal(0, 0) * energy));
   return true;
 }
@@ -319,41 +333,42 @@ double along_variance(const Template& base, double residual_variance) {
   constexpr double kFloorPx = 0.1;
   constexpr double kCalibrationPx = 0.15;
   const double gg = base.normal(1, 1);
-  const double oblique = kCalibrationPx * base.normal(1, 2) / gg;
+  const double oblique = kCalibrationPx * base.normal(1, 3) / gg;
   return kFloorPx * kFloorPx + oblique * oblique + 2.0 * residual_variance / gg;
 }
 
 /// Displacement across the curve: whole pixels by correlation, so that a decalibration of some
 /// pixels is seen, then both displacements together.
-void measure_displacement_across(const PatchSearch& search, const Template& base, const Vec2& pixel,
-                                 Alignment* out) {
+void measure_displacement_across(const PatchSearch& search, const Template& base,
+                                 const Placement& aligned, Alignment* out) {
   constexpr double kFloorPx = 0.1;
   constexpr double kMaxSigma = 1.0;
   constexpr int kReach = 2;
   out->across_px = 0.0;
   out->across_sigma_px = std::numeric_limits<double>::infinity();
-  const Mat2 axes = base.axes.cast<double>();
-  Vec2 start = Vec2::Zero();
+  const Vec2 e = base.axes.col(0).cast<double>();
+  const Vec2 n = base.axes.col(1).cast<double>();
+  Placement at = aligned;
   double best = -1.0;
+  Fit last;
   for (int t = -kReach; t <= kReach; ++t) {
-    Fit trial;
-    const Vec2 offset(0.0, t);
-    if (fit(search, base, pixel + axes * offset, false, &trial) && trial.zncc > best) {
-      best = trial.zncc;
-      start = offset;
+    const Placement trial{aligned.pixel + t * n, aligned.shear};
+    if (fit(search, base, trial, false, &last) && last.zncc > best) {
+      best = last.zncc;
+      at = trial;
     }
   }
-  Fit last;
   for (int i = 0; i < 3; ++i) {
-    if (!fit(search, base, pixel + axes * start, true, &last)) return;
-    const double length = last.displacement.norm();
-    start -= last.displacement * std::min(1.0, 1.0 / std::max(length, 1e-9));
+    if (!fit(search, base, at, true, &last)) return;
+    const double length = std::hypot(last.along, last.across);
+    at.pixel -= std::min(1.0, 1.0 / std::max(length, 1e-9)) * (last.along * e + last.across * n);
     if (length < 0.02) break;
   }
   const double variance =
-      kFloorPx * kFloorPx + 2.0 * last.residual_variance * base.normal.inverse()(2, 2);
-  if (!(variance < kMaxSigma * kMaxSigma) || std::abs(start.y()) > kReach + 1.0) return;
-  out->across_px = start.y();
+      kFloorPx * kFloorPx + 2.0 * last.residual_variance * base.normal.inverse()(3, 3);
+  const double across = n.dot(at.pixel - aligned.pixel);
+  if (!(variance < kMaxSigma * kMaxSigma) || std::abs(across) > kReach + 1.0) return;
+  out->across_px = across;
   out->across_sigma_px = std::sqrt(variance);
 }
 
@@ -374,24 +389,27 @@ std::optional<Alignment> align(const PatchSearch& search, double rho, bool measu
   if (!point || !make_template(search, *point, &base)) return std::nullopt;
   const double start = rho;
   const double speed = point->derivative.norm();
+  Placement at{point->pixel, 0.0};
   Fit last;
   for (int i = 0; i < kIterations; ++i) {
-    if (!fit(search, base, point->pixel, false, &last)) return std::nullopt;
-    const double step = std::clamp(last.displacement.x(), -1.0, 1.0);
-    if (std::abs(step) < 0.01) break;
+    if (!fit(search, base, at, false, &last)) return std::nullopt;
+    const double step = std::clamp(last.along, -1.0, 1.0);
+    if (std::abs(step) < 0.01 && std::abs(last.shear) < 0.01) break;
     rho -= step / speed;
     if (std::abs(rho - start) * speed > kMaxMove) return std::nullopt;
     point = search.curve.at(rho);
     if (!point) return std::nullopt;
+    at.pixel = point->pixel;
+    at.shear = std::clamp(at.shear - last.shear, -kMaxShear, kMaxShear);
   }
-  if (!fit(search, base, point->pixel, false, &last)) return std::nullopt;
+  if (!fit(search, base, at, false, &last)) return std::nullopt;
   Alignment out;
   out.rho = rho;
   out.zncc = last.zncc;
   out.px_per_rho = point->derivative.norm();
   out.sigma_px = std::sqrt(along_variance(base, last.residual_variance));
   out.pixel = point->pixel;
-  if (measure_across) measure_displacement_across(search, base, point->pixel, &out);
+  if (measure_across) measure_displacement_across(search, base, at, &out);
   return out;
 }
 

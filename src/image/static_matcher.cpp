@@ -10,7 +10,7 @@ namespace sovo {
 
 namespace {
 
-constexpr int kMaxExhaustiveSteps = 160;   ///< Longer ranges are searched one level coarser.
+constexpr int kMaxExhaustiveSteps = 40;    ///< Longer ranges are searched one level coarser.
 constexpr int kModeDistance = 2;           ///< Modes are more than so many steps apart.
 constexpr double kBehindInfinityPx = 1.5;  ///< Noise may move a point at infinity this far.
 constexpr float kModeWindow = 0.25F;       ///< Coarse modes this far below the best are dropped.

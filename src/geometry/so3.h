@@ -22,9 +22,10 @@ struct Series {
 };
 
 inline Series series(double theta_squared) {
-  if (theta_squared < 1e-8) {
-    return {1.0 - theta_squared / 6.0, 0.5 - theta_squared / 24.0,
-            1.0 / 6.0 - theta_squared / 120.0};
+  if (theta_squared < 1e-4) {  // the closed forms lose digits from here on
+    const double t2 = theta_squared;
+    return {1.0 - t2 / 6.0 * (1.0 - t2 / 20.0), 0.5 - t2 / 24.0 * (1.0 - t2 / 30.0),
+            1.0 / 6.0 - t2 / 120.0 * (1.0 - t2 / 42.0)};
   }
   const double theta = std::sqrt(theta_squared);
   return {std::sin(theta) / theta, (1.0 - std::cos(theta)) / theta_squared,

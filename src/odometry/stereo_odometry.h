@@ -56,7 +56,10 @@ struct StereoOdometryConfig {
   bool deterministic = false;  ///< All stages in order on the caller's thread.
   int threads = 2;             ///< Of the loops inside the stages; changes no bit of the result.
   int seed = 0;
-  int mapping_queue = 4;  ///< Live: frames that may wait for mapping before one is dropped.
+  int mapping_queue = 4;          ///< Live: frames that may wait for mapping before one is dropped.
+  bool wait_for_mapping = false;  ///< Live: wait instead of dropping.
+  int lost_frames = 5;  ///< Frames in a row without a pose after which a new segment begins.
+  double scale_timeout_s = 3.0;  ///< Without an accepted scale: state SCALE_UNOBSERVED.
   DirectConfig vo;
   ScaleOptimizerConfig scale;
   ScaleFilterConfig filter;
@@ -75,6 +78,9 @@ struct StereoOdometryConfig {
     v("threads", threads, "of the loops inside the stages; changes no bit of the result");
     v("seed", seed, "of every random choice");
     v("mapping_queue", mapping_queue, "frames that may wait for mapping before one is dropped");
+    v("wait_for_mapping", wait_for_mapping, "wait for mapping instead of dropping frames");
+    v("lost_frames", lost_frames, "frames in a row without a pose that begin a new segment");
+    v("scale_timeout_s", scale_timeout_s, "without an accepted scale: SCALE_UNOBSERVED [s]");
     v("vo", vo, "direct monocular odometry");
     v("scale", scale, "scale optimization");
     v("filter", filter, "scale filter");

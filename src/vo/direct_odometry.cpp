@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "sovo/vo/epipolar_search.h"
 #include "sovo/vo/keyframe_policy.h"
@@ -274,8 +275,11 @@ void DirectOdometry::take_snapshot() {
   s.T_world_camera = newest.T_world_camera();
   s.camera = camera_;
   s.pyramid = newest.pyramid;
+  s.mean_inverse_depth = window_.mean_inverse_depth();
+  std::size_t shared = 0;
   for (int h = 0; h + 1 < window_.size(); ++h) {
-    for (const Point& p : window_[h].points) {
+    for (Point& p : window_[h].points) {
+      const bool was_in = std::exchange(p.in_snapshot, false);
       const Residual& r = p.residuals[slot];
       if (r.state != ResidualState::kIn || p.hessian <= 0.0 || r.centre_rho <= 0.0F) continue;
       // Pattern pixels are correlated: half of them count.
@@ -286,7 +290,12 @@ void DirectOdometry::take_snapshot() {
       s.points.v.push_back(r.centre_v);
       s.points.inverse_depth.push_back(r.centre_rho);
       s.points.sigma.push_back(static_cast<float>(sigma * ratio * ratio));
+      p.in_snapshot = true;
+      shared += was_in ? 1 : 0;
     }
+  }
+  if (s.points.size() > 0) {
+    s.shared_points = static_cast<double>(shared) / static_cast<double>(s.points.size());
   }
   snapshot_ = std::move(s);
 }
@@ -297,22 +306,33 @@ double DirectOdometry::apply(const ScaleCorrection& correction) {
   const double scale = std::exp(log_scale);
   const Vec3 centre = window_.newest().T_world_camera().translation();
   window_.apply_similarity(scale);
-  for (int i = 0; i + 1 < window_.size(); ++i) {
-    KeyframePose& record = keyframes_[window_[i].id];
-    record.later_scale *= scale;
-    record.later_shift = scale * record.later_shift + (1.0 - scale) * centre;
-  }
   log_scale_ += log_scale;
+  if (correction.first_lock) {
+    rescale_records(scale, centre);
+  } else {
+    for (int i = 0; i + 1 < window_.size(); ++i) {
+      KeyframePose& record = keyframes_[window_[i].id];
+      record.later_scale *= scale;
+      record.later_shift = scale * record.later_shift + (1.0 - scale) * centre;
+    }
+    keyframes_[window_.newest().id].own_log_scale += log_scale;
+  }
   ++scale_epoch_;
   epoch_log_scale_.push_back(log_scale_);
-  KeyframePose& newest = keyframes_[window_.newest().id];
-  newest.own_log_scale += log_scale;
-  newest.log_scale = log_scale_;
+  keyframes_[window_.newest().id].log_scale = log_scale_;
   record_poses();
   auto next = std::make_shared<TrackingReference>(rescaled(*reference(), scale));
   const std::lock_guard lock(reference_mutex_);
   reference_ = std::move(next);
   return log_scale;
+}
+
+void DirectOdometry::rescale_records(double scale, const Vec3& centre) {
+  for (KeyframePose& record : keyframes_) {
+    Vec3& position = record.T_world_camera.translation();
+    position = centre + scale * (position - centre);
+    record.log_scale = log_scale_;
+  }
 }
 
 }  // namespace sovo

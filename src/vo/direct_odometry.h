@@ -99,6 +99,9 @@ class DirectOdometry {
   /// Tracks a frame against the newest reference. `tracking.good` is false when it is lost.
   TrackedFrame track(const MonoFrame& frame);
 
+  /// The same from a known motion since the newest keyframe.
+  TrackedFrame track_from(const MonoFrame& frame, const SE3& T_current_reference);
+
   /// Takes a tracked frame into the map: traces the immature points, or makes it a keyframe.
   MapResult map(const TrackedFrame& tracked, const DepthProposer& proposer, const MapTimer& timer);
 
@@ -126,7 +129,11 @@ class DirectOdometry {
   void marginalize(const MapTimer& timer);
   void publish_reference();
   void record_poses();
+  void rescale_records(double scale, const Vec3& centre);
   void take_snapshot();
+  TrackedFrame track_hypotheses(const MonoFrame& frame,
+                                std::shared_ptr<const TrackingReference> reference,
+                                const std::vector<SE3>& hypotheses);
   std::vector<SE3> motion_hypotheses(const TrackingReference& reference) const;
 
   DirectConfig config_;

@@ -63,16 +63,27 @@ std::vector<SE3> DirectOdometry::motion_hypotheses(const TrackingReference& refe
 }
 
 TrackedFrame DirectOdometry::track(const MonoFrame& frame) {
-  TrackedFrame out;
-  out.frame = frame;
-  out.reference = reference();
-  const TrackingReference& ref = *out.reference;
   expected_steps_ = 1.0;
   if (past_.size() == 2 && past_[1].stamp_ns > past_[0].stamp_ns) {
     const auto before = static_cast<double>(past_[1].stamp_ns - past_[0].stamp_ns);
     expected_steps_ = static_cast<double>(frame.stamp_ns - past_[1].stamp_ns) / before;
   }
-  const std::vector<SE3> hypotheses = motion_hypotheses(ref);
+  auto ref = reference();
+  const std::vector<SE3> hypotheses = motion_hypotheses(*ref);
+  return track_hypotheses(frame, std::move(ref), hypotheses);
+}
+
+TrackedFrame DirectOdometry::track_from(const MonoFrame& frame, const SE3& T_current_reference) {
+  return track_hypotheses(frame, reference(), {T_current_reference});
+}
+
+TrackedFrame DirectOdometry::track_hypotheses(const MonoFrame& frame,
+                                              std::shared_ptr<const TrackingReference> reference,
+                                              const std::vector<SE3>& hypotheses) {
+  TrackedFrame out;
+  out.frame = frame;
+  out.reference = std::move(reference);
+  const TrackingReference& ref = *out.reference;
   const bool same_reference = has_first_rmse_ && first_rmse_keyframe_ == ref.keyframe_id;
   out.tracking =
       tracker_.track(ref, *frame.pyramid, frame.exposure_s, last_affine_, hypotheses, last_rmse_);

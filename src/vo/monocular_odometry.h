@@ -29,6 +29,8 @@ struct KeyframeSnapshot {
   CameraModel camera;       ///< Undistorted left camera (no distortion) of `pyramid`'s level 0.
   ImagePyramidPtr pyramid;  ///< Undistorted left image, photometrically corrected.
   KeyframePoints points;
+  double shared_points = 0.0;       ///< Share of the points that the last snapshot had too.
+  double mean_inverse_depth = 1.0;  ///< Of the window's points [1/m].
 };
 
 /// A similarity measured on a snapshot: every length of the window is to be multiplied by
@@ -38,6 +40,8 @@ struct ScaleCorrection {
   std::uint32_t keyframe_id = 0;
   std::uint64_t scale_epoch = 0;
   double log_scale = 0.0;
+  /// The map had no scale so far: what was built in it before is rescaled for good, too.
+  bool first_lock = false;
 };
 
 }  // namespace sovo

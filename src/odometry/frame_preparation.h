@@ -1,0 +1,58 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "sovo/image/pyramid.h"
+#include "sovo/image/stereo_frame.h"
+#include "sovo/image/undistorter.h"
+#include "sovo/odometry/stereo_odometry.h"
+#include "sovo/vo/direct_odometry.h"
+
+namespace sovo {
+
+/// From raw stereo frames to what is tracked: the left image undistorted, the right one as its
+/// camera sees it, both photometrically corrected and reduced.
+class FramePreparation {
+ public:
+  FramePreparation(const StereoOdometryConfig& config, const StereoCameras& cameras);
+
+  /// Left: the tracked pinhole camera; right: raw, with distortion. Both reduced.
+  const StereoRig& rig() const { return rig_; }
+  /// 0 where the tracked left image must not be used; empty when all may be.
+  const ImageU8& left_mask() const { return left_mask_; }
+
+  /// What is wrong with a side: missing, of another size, black; empty when nothing is.
+  std::string check_side(const SideImage& side, bool is_left) const;
+
+  /// Left image ready to be tracked. Precondition: `check_side` found nothing.
+  MonoFrame prepare_left(const StereoFrame& frame, StageObserver* observer);
+
+  /// Right image ready for matching and scale optimization.
+  ImagePyramid prepare_right(const SideImage& right) const;
+
+ private:
+  StereoCameras cameras_;
+  int downscale_;
+  int max_levels_;
+  StereoRig rig_;
+  std::optional<Undistorter> undistorter_;
+  ImageU8 left_mask_;
+  ImageF raw_left_;
+};
+
+/// Times a stage and reports it when it goes out of scope.
+class ScopedStage {
+ public:
+  ScopedStage(StageObserver* observer, Stage stage);
+  ~ScopedStage();
+  ScopedStage(const ScopedStage&) = delete;
+  ScopedStage& operator=(const ScopedStage&) = delete;
+
+ private:
+  StageObserver* observer_;
+  Stage stage_;
+  std::int64_t start_ns_;
+};
+
+}  // namespace sovo

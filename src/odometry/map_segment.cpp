@@ -1,0 +1,306 @@
+#include "sovo/odometry/map_segment.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+namespace sovo {
+
+namespace {
+
+constexpr int kMatchBlock = 64;
+
+Stage stage_of(MapStage stage) {
+  switch (stage) {
+    case MapStage::kTracing:
+      return Stage::kTracing;
+    case MapStage::kSelection:
+      return Stage::kSelection;
+    case MapStage::kStaticMatching:
+      return Stage::kStaticMatching;
+    case MapStage::kBundleAdjustment:
+      return Stage::kBundleAdjustment;
+    case MapStage::kMarginalization:
+      break;
+  }
+  return Stage::kMarginalization;
+}
+
+double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+DepthProposal proposal_of(const StaticMatch& match) {
+  if (match.state != MatchState::kMatched) return {};
+  return {match.inverse_depth, match.sigma};
+}
+
+}  // namespace
+
+MapSegment::MapSegment(const StereoOdometryConfig& config, const FramePreparation& preparation,
+                       std::uint32_t index, const SE3& T_odom_left_start, WorkerPool* pool,
+                       StageObserver* observer)
+    : config_(config),
+      preparation_(preparation),
+      index_(index),
+      T_odom_left_start_(T_odom_left_start),
+      pool_(pool),
+      observer_(observer),
+      vo_(config.vo, preparation.rig().left, preparation.left_mask(), config.seed, pool),
+      matcher_(config.matcher, preparation.rig()),
+      optimizer_(config.scale, preparation.rig()),
+      filter_(config.filter) {}
+
+bool MapSegment::initialize(const MonoFrame& frame, const SideImage* right) {
+  if (!two_view_) {
+    if (config_.init != InitMethod::kTwoView && right != nullptr &&
+        initialize_from_stereo(frame, *right)) {
+      return true;
+    }
+    if (config_.init == InitMethod::kStereo) {
+      if (right == nullptr) reason_ = "waiting for a right image to begin from stereo depth";
+      return false;
+    }
+    two_view_ = true;
+  }
+  return initialize_from_two_views(frame, right);
+}
+
+bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage& right) {
+  const std::vector<SelectedPixel> pixels =
+      vo_.select_pixels(frame, config_.vo.points.active_points);
+  const ImagePyramid right_pyramid = preparation_.prepare_right(right);
+  const std::vector<StaticMatch> matches = match_all(*frame.pyramid, right_pyramid, pixels);
+  std::vector<StartPoint> points(pixels.size());
+  std::size_t good = 0;
+  std::size_t in_view = 0;
+  double relative_sigma = 0.0;
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    points[i] = {pixels[i], proposal_of(matches[i])};
+    in_view += matches[i].state != MatchState::kOutOfView ? 1 : 0;
+    if (points[i].depth.sigma <= 0.0F) continue;
+    ++good;
+    relative_sigma += points[i].depth.sigma / std::max(points[i].depth.rho, 1e-6F);
+  }
+  constexpr std::size_t kFewest = 100;
+  const double share = in_view > 0 ? static_cast<double>(good) / static_cast<double>(in_view) : 0.0;
+  if (good < kFewest || (config_.init == InitMethod::kAuto && share < config_.init_min_matched)) {
+    reason_ = "only " + std::to_string(good) + " of " + std::to_string(in_view) +
+              " static stereo matches are good: too little texture, repetitive texture, or a "
+              "wrong calibration (sovo calib check)";
+    return false;
+  }
+  vo_.begin(frame, T_odom_left_start_, points);
+  // Matching errors are independent; what remains is common to all (calibration).
+  filter_.lock_initial(relative_sigma / static_cast<double>(good) / std::sqrt(good),
+                       frame.stamp_ns);
+  publish_scale(nullptr, true);
+  initialized_ = true;
+  reason_.clear();
+  return true;
+}
+
+bool MapSegment::initialize_from_two_views(const MonoFrame& frame, const SideImage* right) {
+  if (two_view_initializer_) {
+    switch (two_view_initializer_->track(frame.stamp_ns, frame.pyramid)) {
+      case TwoViewInitializer::Status::kReady:
+        return finish_two_views(frame, right);
+      case TwoViewInitializer::Status::kNotYet:
+        reason_ = "beginning from two views: " + two_view_initializer_->reason();
+        return false;
+      case TwoViewInitializer::Status::kFailed:
+        break;
+    }
+  }
+  two_view_initializer_ = std::make_unique<TwoViewInitializer>();
+  PixelSelectorConfig selector;
+  selector.seed = config_.seed + 1;
+  two_view_selector_ = std::make_unique<PixelSelector>(selector);
+  const ImageU8& mask = preparation_.left_mask();
+  two_view_first_ = frame;
+  if (!two_view_initializer_->set_first(frame.stamp_ns, frame.pyramid, preparation_.rig().left,
+                                        mask.empty() ? nullptr : &mask, two_view_selector_.get())) {
+    reason_ = "beginning from two views: " + two_view_initializer_->reason();
+    two_view_initializer_.reset();
+  }
+  return false;
+}
+
+bool MapSegment::finish_two_views(const MonoFrame& frame, const SideImage* right) {
+  const TwoViewResult& result = two_view_initializer_->result();
+  std::vector<StartPoint> points;
+  points.reserve(result.points.size());
+  for (const InitialPoint& p : result.points) {
+    StartPoint s;
+    s.pixel.x = static_cast<std::int16_t>(std::lround(p.u));
+    s.pixel.y = static_cast<std::int16_t>(std::lround(p.v));
+    s.depth = {p.inverse_depth, std::max(p.sigma, 1e-3F * p.inverse_depth)};
+    points.push_back(s);
+  }
+  vo_.begin(*two_view_first_, T_odom_left_start_, points);
+  TrackedFrame second = vo_.track_from(frame, result.T_newest_first);
+  two_view_initializer_.reset();
+  two_view_first_.reset();
+  if (!second.tracking.good) {
+    reason_ = "beginning from two views: the second view could not be tracked";
+    return false;
+  }
+  second.wants_keyframe = true;
+  start_outcome_ = map(second, right);
+  initialized_ = !start_outcome_->map.failed;
+  if (initialized_) reason_.clear();
+  return initialized_;
+}
+
+std::optional<MappingOutcome> MapSegment::take_start_outcome() {
+  return std::exchange(start_outcome_, std::nullopt);
+}
+
+std::vector<StaticMatch> MapSegment::match_all(const ImagePyramid& left, const ImagePyramid& right,
+                                               const std::vector<SelectedPixel>& pixels) const {
+  const ScopedStage stage(observer_, Stage::kStaticMatching);
+  std::vector<StaticMatch> matches(pixels.size());
+  const int total = static_cast<int>(pixels.size());
+  pool_->run((total + kMatchBlock - 1) / kMatchBlock, [&](int block) {
+    for (int i = block * kMatchBlock; i < std::min(total, (block + 1) * kMatchBlock); ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      matches[k] = matcher_.match(left, right, pixels[k].x, pixels[k].y);
+    }
+  });
+  return matches;
+}
+
+DepthProposer MapSegment::stereo_proposer(const ImagePyramidPtr& left,
+                                          const ImagePyramid& right) const {
+  return [this, left, &right](const std::vector<SelectedPixel>& pixels,
+                              std::vector<DepthProposal>* proposals) {
+    const std::vector<StaticMatch> matches = match_all(*left, right, pixels);
+    std::transform(matches.begin(), matches.end(), proposals->begin(), proposal_of);
+  };
+}
+
+MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* right) {
+  MappingOutcome out;
+  const MapTimer timer = [this](MapStage stage, double seconds) {
+    // Static matching is timed where it happens.
+    if (observer_ != nullptr && stage != MapStage::kStaticMatching) {
+      observer_->on_stage(stage_of(stage), seconds);
+    }
+  };
+  ScaleJob job;
+  DepthProposer proposer;
+  const bool use_right = tracked.wants_keyframe && right != nullptr;
+  if (use_right) {
+    const auto start = std::chrono::steady_clock::now();
+    job.right = preparation_.prepare_right(*right);
+    job.pyramid_seconds = seconds_since(start);
+    // Depths of an unscaled map are no metres.
+    const bool metric = filter_.locked();
+    if (config_.mode == OdometryMode::kScale && config_.depth_init == DepthInit::kStereo &&
+        metric) {
+      proposer = stereo_proposer(tracked.frame.pyramid, job.right);
+    }
+  }
+  out.map = vo_.map(tracked, proposer, timer);
+  if (!out.map.is_keyframe || out.map.failed) return out;
+  if (observer_ != nullptr) {
+    observer_->on_window(static_cast<std::uint32_t>(out.map.bundle.points),
+                         static_cast<std::uint32_t>(out.map.bundle.residuals));
+  }
+  out.keyframe = keyframe_output();
+  if (use_right && config_.mode == OdometryMode::kScale && vo_.snapshot()) {
+    job.snapshot = *vo_.snapshot();
+    job.cold_start = filter_.wants_cold_start();
+    out.scale_job = std::move(job);
+  }
+  return out;
+}
+
+ScaleEstimate MapSegment::estimate_scale(const ScaleJob& job) const {
+  const auto start = std::chrono::steady_clock::now();
+  const ScaleEstimate estimate = optimizer_.estimate(job.snapshot, job.right, job.cold_start);
+  if (observer_ != nullptr) {
+    observer_->on_stage(Stage::kScaleOptimization, job.pyramid_seconds + seconds_since(start));
+  }
+  return estimate;
+}
+
+ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& estimate) {
+  const bool was_locked = filter_.locked();
+  const double pending = vo_.log_scale() - job.snapshot.log_scale;
+  ScaleMeasurement m;
+  m.estimate = estimate;
+  m.cold_start = job.cold_start;
+  m.stamp_ns = job.snapshot.stamp_ns;
+  m.shared_points = job.snapshot.shared_points;
+  m.pending_log_scale = pending;
+  const Vec3& position = job.snapshot.T_world_camera.translation();
+  if (last_keyframe_position_) {
+    m.distance = (position - *last_keyframe_position_).norm() * job.snapshot.mean_inverse_depth;
+  }
+  last_keyframe_position_ = position;
+
+  const ScaleUpdate update = filter_.update(m);
+  ScaleRecord record;
+  record.stamp_ns = job.snapshot.stamp_ns;
+  record.keyframe_id = job.snapshot.id;
+  record.measured = estimate.log_scale;
+  record.sigma = estimate.sigma;
+  record.verdict = update.verdict;
+  record.residual = estimate.residual;
+  if (update.apply) {
+    ScaleCorrection correction;
+    correction.keyframe_id = job.snapshot.id;
+    correction.scale_epoch = job.snapshot.scale_epoch;
+    correction.log_scale = pending + update.log_scale_correction;
+    correction.first_lock = !was_locked;
+    record.correction = vo_.apply(correction);
+  }
+  publish_scale(&record, update.apply);
+  return record;
+}
+
+void MapSegment::publish_scale(const ScaleRecord* record, bool accepted) {
+  const std::lock_guard lock(status_mutex_);
+  status_.locked = filter_.locked() && config_.mode == OdometryMode::kScale;
+  status_.log_scale = vo_.log_scale();
+  status_.sigma = filter_.sigma();
+  if (record != nullptr) {
+    status_.last_correction = record->correction;
+    status_.residual = record->residual;
+    status_.verdict = record->verdict;
+    if (accepted) status_.accepted_stamp_ns = record->stamp_ns;
+  } else if (accepted) {
+    status_.verdict = ScaleVerdict::kAccepted;
+  }
+}
+
+ScaleStatus MapSegment::scale_status() const {
+  const std::lock_guard lock(status_mutex_);
+  return status_;
+}
+
+KeyframeOutput MapSegment::keyframe_output() const {
+  const Window& window = vo_.window();
+  const KeyframeSnapshot& s = *vo_.snapshot();
+  KeyframeOutput out;
+  out.id = s.id;
+  out.segment = index_;
+  out.stamp_ns = s.stamp_ns;
+  out.T_odom_left = window.newest().T_world_camera();
+  out.log_scale = vo_.log_scale();
+  out.u = s.points.u;
+  out.v = s.points.v;
+  out.inverse_depth = s.points.inverse_depth;
+  out.sigma = s.points.sigma;
+  const ImageF& image = s.pyramid->level(0);
+  out.intensity.reserve(out.u.size());
+  for (std::size_t i = 0; i < out.u.size(); ++i) {
+    const int x = std::clamp(static_cast<int>(out.u[i] + 0.5F), 0, image.width() - 1);
+    const int y = std::clamp(static_cast<int>(out.v[i] + 0.5F), 0, image.height() - 1);
+    out.intensity.push_back(static_cast<std::uint8_t>(std::clamp(image.at(x, y), 0.0F, 255.0F)));
+  }
+  return out;
+}
+
+}  // namespace sovo

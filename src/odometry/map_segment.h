@@ -1,0 +1,112 @@
+#pragma once
+
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "sovo/image/static_matcher.h"
+#include "sovo/odometry/frame_preparation.h"
+#include "sovo/odometry/odometry_output.h"
+#include "sovo/odometry/stereo_odometry.h"
+#include "sovo/vo/direct_odometry.h"
+#include "sovo/vo/two_view_initializer.h"
+
+namespace sovo {
+
+/// What tracking publishes about the scale.
+struct ScaleStatus {
+  bool locked = false;
+  double log_scale = 0.0;
+  double sigma = 0.0;
+  double last_correction = 0.0;
+  double residual = 0.0;
+  std::int64_t accepted_stamp_ns = 0;
+  ScaleVerdict verdict = ScaleVerdict::kTooFewPoints;
+};
+
+/// A keyframe's snapshot with the right image that was taken with it.
+struct ScaleJob {
+  KeyframeSnapshot snapshot;
+  ImagePyramid right;
+  double pyramid_seconds = 0.0;  ///< What the right pyramid cost.
+  bool cold_start = false;
+};
+
+/// What mapping a frame brought.
+struct MappingOutcome {
+  MapResult map;
+  std::optional<KeyframeOutput> keyframe;
+  std::optional<ScaleJob> scale_job;
+};
+
+/// One map from its beginning to its loss: the direct odometry of the left camera, its
+/// initialization, and the scale filter.
+///
+/// `initialize` and `track` belong to the tracking thread, `map` and `finish_scale` to the mapping
+/// thread; `estimate_scale` may run anywhere.
+class MapSegment {
+ public:
+  MapSegment(const StereoOdometryConfig& config, const FramePreparation& preparation,
+             std::uint32_t index, const SE3& T_odom_left_start, WorkerPool* pool,
+             StageObserver* observer);
+
+  std::uint32_t index() const { return index_; }
+  bool initialized() const { return initialized_; }
+
+  /// Tries to begin the map with this frame; `right` may be null. Returns true when the map has
+  /// begun; `T_odom_left` is then this frame's pose. `reason()` tells what is missing.
+  bool initialize(const MonoFrame& frame, const SideImage* right);
+  const std::string& reason() const { return reason_; }
+
+  TrackedFrame track(const MonoFrame& frame) { return vo_.track(frame); }
+
+  /// Maps a tracked frame. `right` may be null (missing): then there is no scale job.
+  MappingOutcome map(const TrackedFrame& tracked, const SideImage* right);
+
+  /// The scale of a job; a pure function.
+  ScaleEstimate estimate_scale(const ScaleJob& job) const;
+
+  /// Filters the estimate and applies the correction to the window.
+  ScaleRecord finish_scale(const ScaleJob& job, const ScaleEstimate& estimate);
+
+  ScaleStatus scale_status() const;
+  const DirectOdometry& vo() const { return vo_; }
+  /// The two-view start maps its second frame itself; that job waits here once.
+  std::optional<MappingOutcome> take_start_outcome();
+
+ private:
+  bool initialize_from_stereo(const MonoFrame& frame, const SideImage& right);
+  bool initialize_from_two_views(const MonoFrame& frame, const SideImage* right);
+  bool finish_two_views(const MonoFrame& frame, const SideImage* right);
+  std::vector<StaticMatch> match_all(const ImagePyramid& left, const ImagePyramid& right,
+                                     const std::vector<SelectedPixel>& pixels) const;
+  DepthProposer stereo_proposer(const ImagePyramidPtr& left, const ImagePyramid& right) const;
+  KeyframeOutput keyframe_output() const;
+  void publish_scale(const ScaleRecord* record, bool accepted);
+
+  const StereoOdometryConfig& config_;
+  const FramePreparation& preparation_;
+  std::uint32_t index_;
+  SE3 T_odom_left_start_;
+  WorkerPool* pool_;
+  StageObserver* observer_;
+
+  DirectOdometry vo_;
+  StaticMatcher matcher_;
+  ScaleOptimizer optimizer_;
+  ScaleFilter filter_;
+
+  bool initialized_ = false;
+  bool two_view_ = false;
+  std::string reason_;
+  std::unique_ptr<TwoViewInitializer> two_view_initializer_;
+  std::unique_ptr<PixelSelector> two_view_selector_;
+  std::optional<MonoFrame> two_view_first_;
+  std::optional<MappingOutcome> start_outcome_;
+
+  std::optional<Vec3> last_keyframe_position_;
+  mutable std::mutex status_mutex_;
+  ScaleStatus status_;
+};
+
+}  // namespace sovo

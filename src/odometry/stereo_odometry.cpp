@@ -1,0 +1,320 @@
+#include "sovo/odometry/stereo_odometry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "sovo/odometry/live_threads.h"
+#include "sovo/odometry/map_segment.h"
+#include "sovo/odometry/trajectory_recorder.h"
+
+namespace sovo {
+
+namespace {
+
+/// Tracking with a residual this many times the usual one, or so few inliers, is DEGRADED.
+constexpr double kDegradedInliers = 0.5;
+constexpr double kNanosecond = 1e-9;
+/// Pixels of the reference are neighbours and filled in from few points: so many count as one.
+constexpr double kCorrelatedPixels = 8.0;
+
+}  // namespace
+
+class StereoOdometry::Impl {
+ public:
+  Impl(const StereoOdometryConfig& config, const StereoCameras& cameras, OutputSink* sink,
+       StageObserver* observer)
+      : config_(config),
+        sink_(sink),
+        observer_(observer),
+        preparation_(config_, cameras),
+        pool_(config.threads) {
+    if (!config_.deterministic) {
+      threads_ = std::make_unique<LiveThreads>(
+          static_cast<std::size_t>(std::max(1, config_.mapping_queue)),
+          LiveThreads::Callbacks{[this](const MappingOutcome& o) { publish_keyframe(o); },
+                                 [this](const ScaleRecord& r) { sink_->on_scale(r); }});
+    }
+    begin_segment(SE3());
+  }
+
+  void process(const StereoFrame& frame) {
+    const ScopedStage stage(observer_, Stage::kFrame);
+    ++received_;
+    OdometryOutput out = new_output(frame);
+    const std::string refusal = refuse(frame);
+    if (!refusal.empty()) {
+      ++rejected_;
+      fill_counters(&out);
+      out.state = segment_->initialized() ? OdometryState::kDegraded : OdometryState::kInitializing;
+      out.reason = refusal;
+      sink_->on_frame(out);
+      return;
+    }
+    last_stamp_ns_ = frame.stamp_ns;
+    const std::string right_problem = preparation_.check_side(frame.right, false);
+    const SideImage* right = right_problem.empty() ? &frame.right : nullptr;
+    const MonoFrame left = preparation_.prepare_left(frame, observer_);
+    if (segment_->initialized()) {
+      follow(left, right, right_problem, &out);
+    } else {
+      initialize(left, right, &out);
+    }
+    fill_counters(&out);
+    sink_->on_frame(out);
+  }
+
+  void finish() {
+    if (threads_) threads_->drain();
+  }
+
+  void reset() {
+    finish();
+    recorder_.close_segment(segment_->vo().keyframes());
+    ++reset_counter_;
+    begin_segment(last_pose_);
+  }
+
+  std::vector<TrajectoryPose> trajectory() const {
+    return recorder_.trajectory(&segment_->vo().keyframes());
+  }
+
+  const CameraModel& tracked_camera() const { return preparation_.rig().left; }
+
+ private:
+  std::string refuse(const StereoFrame& frame) const {
+    if (last_stamp_ns_ && frame.stamp_ns <= *last_stamp_ns_) {
+      return frame.stamp_ns == *last_stamp_ns_ ? "the frame's stamp repeats the last one"
+                                               : "the frame's stamp is older than the last one";
+    }
+    return preparation_.check_side(frame.left, true);
+  }
+
+  void begin_segment(const SE3& T_odom_left) {
+    if (threads_) threads_->set_segment(nullptr);
+    segment_ = std::make_unique<MapSegment>(config_, preparation_, next_segment_++, T_odom_left,
+                                            &pool_, observer_);
+    if (threads_) threads_->set_segment(segment_.get());
+    failures_ = 0;
+    published_.reset();
+  }
+
+  void initialize(const MonoFrame& left, const SideImage* right, OdometryOutput* out) {
+    out->state = OdometryState::kInitializing;
+    if (!segment_->initialize(left, right)) {
+      out->reason = segment_->reason();
+      return;
+    }
+    if (auto start = segment_->take_start_outcome()) {
+      publish_keyframe(*start);
+      if (start->scale_job) finish_scale(*start->scale_job);
+    }
+    const auto reference = segment_->vo().reference();
+    TrackedFrame first;
+    first.frame = left;
+    first.reference = reference;
+    first.T_world_camera = reference->T_world_camera;
+    recorder_.add(first);
+    out->is_keyframe = true;
+    out->keyframe_id = reference->keyframe_id;
+    set_pose(first.T_world_camera, Mat6::Zero(), out);
+    out->state = state_of(*out, TrackingResult(), "");
+  }
+
+  void follow(const MonoFrame& left, const SideImage* right, const std::string& right_problem,
+              OdometryOutput* out) {
+    TrackedFrame tracked;
+    {
+      const ScopedStage stage(observer_, Stage::kTracking);
+      tracked = segment_->track(left);
+    }
+    if (map_broke_down() || !tracked.tracking.good) {
+      lose(out);
+      return;
+    }
+    failures_ = 0;
+    recorder_.add(tracked);
+    const TrackingResult& t = tracked.tracking;
+    out->is_keyframe = tracked.wants_keyframe;
+    out->keyframe_id = tracked.reference->keyframe_id;
+    out->inliers = static_cast<std::uint32_t>(t.inliers);
+    out->residual = t.rmse;
+    set_pose(tracked.T_world_camera, covariance_of(tracked), out);
+    map(std::move(tracked), right);
+    out->state = state_of(*out, t, right_problem);
+    out->reason = reason_of(*out, t, right_problem);
+  }
+
+  /// Covariance of (translation, rotation) of the pose in odom axes, from this frame's alignment.
+  static Mat6 covariance_of(const TrackedFrame& tracked) {
+    const TrackingResult& t = tracked.tracking;
+    const double noise = std::max(t.rmse * t.rmse, 1.0) * kCorrelatedPixels;
+    const Mat6 information = t.information / noise + 1e-6 * Mat6::Identity();
+    Mat6 rotate = Mat6::Zero();
+    const Mat3 R = tracked.T_world_camera.rotation_matrix();
+    rotate.topLeftCorner<3, 3>() = R;
+    rotate.bottomRightCorner<3, 3>() = R;
+    return rotate * information.inverse() * rotate.transpose();
+  }
+
+  void lose(OdometryOutput* out) {
+    ++failures_;
+    out->state = OdometryState::kLost;
+    out->pose_valid = false;
+    out->reason = map_broke_down() ? "the map broke down" : "this frame does not fit the map";
+    if (failures_ < config_.lost_frames && !map_broke_down()) return;
+    out->reason += "; a new segment begins";
+    finish();
+    recorder_.close_segment(segment_->vo().keyframes());
+    sync_failed_ = false;
+    begin_segment(last_pose_);
+  }
+
+  bool map_broke_down() const { return sync_failed_ || (threads_ && threads_->map_failed()); }
+
+  void map(TrackedFrame tracked, const SideImage* right) {
+    if (threads_) {
+      MappingJob job{std::move(tracked), std::nullopt};
+      if (right != nullptr && job.tracked.wants_keyframe) job.right = *right;
+      if (!threads_->push(std::move(job), config_.wait_for_mapping)) ++dropped_;
+      return;
+    }
+    MappingOutcome outcome = segment_->map(tracked, right);
+    publish_keyframe(outcome);
+    sync_failed_ = outcome.map.failed;
+    if (outcome.scale_job) finish_scale(*outcome.scale_job);
+  }
+
+  void finish_scale(const ScaleJob& job) {
+    sink_->on_scale(segment_->finish_scale(job, segment_->estimate_scale(job)));
+  }
+
+  void publish_keyframe(const MappingOutcome& outcome) {
+    if (outcome.keyframe) sink_->on_keyframe(*outcome.keyframe);
+    const std::lock_guard lock(map_mutex_);
+    map_points_ = static_cast<std::uint32_t>(outcome.map.active_points);
+    map_keyframes_ = static_cast<std::uint32_t>(outcome.map.keyframes);
+  }
+
+  OdometryOutput new_output(const StereoFrame& frame) const {
+    OdometryOutput out;
+    out.stamp_ns = frame.stamp_ns;
+    out.session = frame.session;
+    out.sequence = frame.sequence;
+    out.sync_error_s = frame.pair_error_s;
+    return out;
+  }
+
+  void fill_counters(OdometryOutput* out) const {
+    out->received = received_;
+    out->rejected = rejected_;
+    out->dropped_queue = dropped_;
+    out->reset_counter = reset_counter_;
+    out->segment = segment_->index();
+    out->distance_m = distance_;
+    out->queue_depth = threads_ ? static_cast<std::uint32_t>(threads_->queue_depth()) : 0;
+    const std::lock_guard lock(map_mutex_);
+    out->points = map_points_;
+    out->keyframes = map_keyframes_;
+  }
+
+  void set_pose(const SE3& T_odom_left, const Mat6& covariance, OdometryOutput* out) {
+    out->pose_valid = true;
+    out->T_odom_left = T_odom_left;
+    out->pose_covariance = covariance;
+    const ScaleStatus scale = segment_->scale_status();
+    out->scale_valid = scale.locked;
+    out->log_scale = scale.log_scale;
+    out->log_scale_sigma = scale.sigma;
+    out->last_correction = scale.last_correction;
+    out->scale_residual = scale.residual;
+    out->scale_verdict = scale.verdict;
+    if (scale.accepted_stamp_ns != 0) {
+      out->scale_age_s = kNanosecond * static_cast<double>(out->stamp_ns - scale.accepted_stamp_ns);
+    }
+    if (published_) {
+      const double dt = kNanosecond * static_cast<double>(out->stamp_ns - published_->stamp_ns);
+      const SE3 step = published_->T_odom_left.inverse() * T_odom_left;
+      out->velocity = step.log() / dt;
+      out->velocity_covariance = 2.0 * covariance / (dt * dt);
+      distance_ += step.translation().norm();
+    }
+    published_ = TrajectoryPose{out->stamp_ns, T_odom_left};
+    last_pose_ = T_odom_left;
+  }
+
+  OdometryState state_of(const OdometryOutput& out, const TrackingResult& t,
+                         const std::string& right_problem) const {
+    const bool tracked = t.good;
+    if (tracked && t.inlier_ratio < kDegradedInliers) return OdometryState::kDegraded;
+    if (!right_problem.empty()) return OdometryState::kDegraded;
+    const bool scaled = config_.mode == OdometryMode::kScale;
+    if (scaled && (!out.scale_valid || scale_is_old(out))) return OdometryState::kScaleUnobserved;
+    return OdometryState::kTracking;
+  }
+
+  /// Only a scale that was sought and not found for long is unobserved: standing still makes no
+  /// keyframes and loses no scale.
+  bool scale_is_old(const OdometryOutput& out) const {
+    return out.scale_age_s > config_.scale_timeout_s &&
+           out.scale_verdict != ScaleVerdict::kAccepted;
+  }
+
+  std::string reason_of(const OdometryOutput& out, const TrackingResult& t,
+                        const std::string& right_problem) const {
+    if (!right_problem.empty()) return right_problem + "; the scale is not measured";
+    if (out.state == OdometryState::kDegraded) {
+      return "only " + std::to_string(static_cast<int>(100.0 * t.inlier_ratio)) +
+             " % of the pixels agree";
+    }
+    if (out.state == OdometryState::kScaleUnobserved) {
+      return "scale not measured: " + to_string(out.scale_verdict);
+    }
+    return "";
+  }
+
+  StereoOdometryConfig config_;
+  OutputSink* sink_;
+  StageObserver* observer_;
+  FramePreparation preparation_;
+  WorkerPool pool_;
+
+  std::unique_ptr<MapSegment> segment_;
+  std::uint32_t next_segment_ = 0;
+  TrajectoryRecorder recorder_;
+  std::optional<std::int64_t> last_stamp_ns_;
+  std::optional<TrajectoryPose> published_;
+  SE3 last_pose_;
+  double distance_ = 0.0;
+  int failures_ = 0;
+  bool sync_failed_ = false;
+  std::uint64_t received_ = 0;
+  std::uint64_t rejected_ = 0;
+  std::uint64_t dropped_ = 0;
+  std::uint32_t reset_counter_ = 0;
+
+  mutable std::mutex map_mutex_;
+  std::uint32_t map_points_ = 0;
+  std::uint32_t map_keyframes_ = 0;
+
+  // Last: its threads use what stands above.
+  std::unique_ptr<LiveThreads> threads_;
+};
+
+StereoOdometry::StereoOdometry(const StereoOdometryConfig& config, const StereoCameras& cameras,
+                               OutputSink* sink, StageObserver* observer)
+    : impl_(std::make_unique<Impl>(config, cameras, sink, observer)) {}
+
+StereoOdometry::~StereoOdometry() = default;
+
+void StereoOdometry::process(const StereoFrame& frame) { impl_->process(frame); }
+void StereoOdometry::finish() { impl_->finish(); }
+void StereoOdometry::reset() { impl_->reset(); }
+std::vector<TrajectoryPose> StereoOdometry::refined_trajectory() const {
+  return impl_->trajectory();
+}
+const CameraModel& StereoOdometry::tracked_camera() const { return impl_->tracked_camera(); }
+
+}  // namespace sovo

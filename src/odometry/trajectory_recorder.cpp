@@ -1,0 +1,56 @@
+#include "sovo/odometry/trajectory_recorder.h"
+
+#include <cmath>
+
+namespace sovo {
+
+std::vector<SE3> refined_keyframe_poses(const std::vector<KeyframePose>& keyframes) {
+  std::vector<SE3> poses;
+  poses.reserve(keyframes.size());
+  Vec3 last_y = Vec3::Zero();
+  for (const KeyframePose& k : keyframes) {
+    const Vec3 y = (k.T_world_camera.translation() - k.later_shift) / k.later_scale;
+    const Vec3 position =
+        poses.empty() ? y : poses.back().translation() + std::exp(k.own_log_scale) * (y - last_y);
+    poses.emplace_back(k.T_world_camera.rotation(), position);
+    last_y = y;
+  }
+  return poses;
+}
+
+void TrajectoryRecorder::add(const TrackedFrame& tracked) {
+  frames_.push_back({tracked.frame.stamp_ns, tracked.reference->keyframe_id,
+                     tracked.tracking.T_current_reference, tracked.reference->log_scale});
+}
+
+void TrajectoryRecorder::compose(const std::vector<KeyframePose>& keyframes,
+                                 std::vector<TrajectoryPose>* out) const {
+  const std::vector<SE3> poses = refined_keyframe_poses(keyframes);
+  // A frame that became a keyframe has the keyframe's pose.
+  std::size_t next = 0;
+  for (const FrameRecord& f : frames_) {
+    while (next < keyframes.size() && keyframes[next].stamp_ns < f.stamp_ns) ++next;
+    if (next < keyframes.size() && keyframes[next].stamp_ns == f.stamp_ns) {
+      out->push_back({f.stamp_ns, poses[next]});
+      continue;
+    }
+    if (f.keyframe_id >= keyframes.size()) continue;
+    SE3 T = f.T_left_keyframe;
+    T.translation() *= std::exp(keyframes[f.keyframe_id].log_scale - f.log_scale);
+    out->push_back({f.stamp_ns, poses[f.keyframe_id] * T.inverse()});
+  }
+}
+
+void TrajectoryRecorder::close_segment(const std::vector<KeyframePose>& keyframes) {
+  compose(keyframes, &closed_);
+  frames_.clear();
+}
+
+std::vector<TrajectoryPose> TrajectoryRecorder::trajectory(
+    const std::vector<KeyframePose>* keyframes) const {
+  std::vector<TrajectoryPose> out = closed_;
+  if (keyframes != nullptr) compose(*keyframes, &out);
+  return out;
+}
+
+}  // namespace sovo

@@ -30,6 +30,7 @@ class TemporaryFolder {
   std::string write(const std::string& name, const std::string& text) const {
     const std::filesystem::path file = path_ / name;
     std::filesystem::create_directories(file.parent_path());
+    std::filesystem::remove(file);
     std::ofstream(file, std::ios::binary) << text;
     return file;
   }

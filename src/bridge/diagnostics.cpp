@@ -1,0 +1,47 @@
+#include "sovo/bridge/diagnostics.h"
+
+#include "sovo/bridge/borrow.h"
+#include "sovo/bridge/ros_conversion.h"
+
+namespace sovo::bridge {
+
+std::uint8_t diagnostic_level(OdometryState state) {
+  using Level = MessageTraits<msg::DiagnosticStatus>;
+  if (state == OdometryState::kTracking) return Level::OK;
+  return state == OdometryState::kLost ? Level::ERROR : Level::WARN;
+}
+
+DiagnosticsMessage::DiagnosticsMessage(const std::string& process_name,
+                                       const OdometryOutput& output, const FeedStatus& feed,
+                                       std::int64_t now_ns)
+    : name_(process_name), text_(to_string(output.state)) {
+  if (!output.reason.empty()) text_ += ": " + output.reason;
+  values_ = {
+      {"received", std::to_string(output.received)},
+      {"lost_transport", std::to_string(feed.lost_transport)},
+      {"dropped_queue", std::to_string(output.dropped_queue + feed.dropped_queue)},
+      {"rejected", std::to_string(output.rejected + feed.rejected)},
+      {"segment", std::to_string(output.segment)},
+      {"points", std::to_string(output.points)},
+      {"inliers", std::to_string(output.inliers)},
+      {"keyframes", std::to_string(output.keyframes)},
+      {"residual", std::to_string(output.residual)},
+      {"scale_valid", output.scale_valid ? "true" : "false"},
+      {"log_scale_sigma", std::to_string(output.log_scale_sigma)},
+      {"scale_age_s", std::to_string(output.scale_age_s)},
+      {"scale_verdict", to_string(output.scale_verdict)},
+      {"distance_m", std::to_string(output.distance_m)},
+  };
+  for (const auto& [key, value] : values_) key_values_.push_back({borrow(key), borrow(value)});
+  msg::DiagnosticStatus status{};
+  status.level = diagnostic_level(output.state);
+  status.name = borrow(name_);
+  status.message = borrow(text_);
+  status.hardware_id = borrow("");
+  borrow(status.values, key_values_);
+  status_.push_back(status);
+  message_.header = {to_message(now_ns), borrow("")};
+  borrow(message_.status, status_);
+}
+
+}  // namespace sovo::bridge

@@ -1,0 +1,90 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "sovo/bridge/odometry_conversion.h"
+#include "sovo/bridge/participant.h"
+#include "sovo/bridge/stage_timings.h"
+#include "sovo/bridge/writer.h"
+
+namespace sovo::bridge {
+
+struct VoPublisherConfig {
+  bool publish_tf = true;
+  bool publish_odom = true;  ///< False in mode mono, whose lengths are not metric.
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("publish_tf", publish_tf, "send odom -> base_link to /tf; false beside an EKF that does");
+  }
+};
+
+/// What an odometry process publishes: `odom`, `scaled_odometry`, `status`, `keyframe`, `path`
+/// (1 Hz), `/tf` and `/diagnostics` (1 Hz).
+///
+///     auto publisher = VoPublisher::open(participant, config, rig.T_base_left);
+///     StereoOdometry odometry(odometry_config, cameras, publisher->get(),
+///     (*publisher)->timings()); for each frame: (*publisher)->set_feed(status_of_the_feed);
+///     odometry.process(frame);
+///
+/// Nothing goes to `odom`, `/tf` and `path` before the scale is valid, and only `status` speaks of
+/// a frame without a pose.
+class VoPublisher : public OutputSink {
+ public:
+  ~VoPublisher() override;
+
+  static Result<std::unique_ptr<VoPublisher>> open(const Participant& participant,
+                                                   const VoPublisherConfig& config,
+                                                   const SE3& T_base_left);
+
+  /// Stages that are timed are told in `status`.
+  StageTimings* timings() { return &timings_; }
+
+  /// What is known about the feed, for the following frames; from any thread.
+  void set_feed(const FeedStatus& feed);
+
+  void on_frame(const OdometryOutput& output) override;
+  void on_keyframe(const KeyframeOutput& keyframe) override;
+  void on_scale(const ScaleRecord& /*record*/) override {}
+
+  /// Writes that failed since the start, and what was wrong with the last.
+  std::uint64_t failed_writes() const { return failed_writes_; }
+  std::string last_failure() const;
+
+ private:
+  struct Writers;
+
+  VoPublisher();
+
+  void publish_pose(const OdometryOutput& output);
+  void publish_transform(const OdometryOutput& output, const BaseMotion& motion);
+  void publish_diagnostics(const OdometryOutput& output, const FeedStatus& feed);
+  void publish_path(const KeyframeOutput& keyframe);
+  void check(const Result<void>& written);
+
+  VoPublisherConfig config_;
+  SE3 T_base_left_;
+  OdometryFrames frames_;
+  std::string process_name_;
+  std::unique_ptr<Writers> writers_;
+  StageTimings timings_;
+
+  mutable std::mutex mutex_;  // of feed_ and failure_
+  FeedStatus feed_;
+  std::string failure_;
+
+  std::atomic<bool> metric_{false};
+  std::atomic<std::uint64_t> failed_writes_{0};
+  std::map<std::uint32_t, msg::PoseStamped> path_;  // by keyframe; only on_keyframe uses it
+  std::uint32_t path_segment_ = 0;
+  std::chrono::steady_clock::time_point last_path_;
+  std::chrono::steady_clock::time_point last_diagnostics_;
+};
+
+}  // namespace sovo::bridge

@@ -7,8 +7,13 @@ namespace sovo {
 
 namespace {
 
-constexpr float kNowhere = -1e6F;
+constexpr float kNowhere = -1e12F;
 constexpr float kMinDepth = 1e-4F;  ///< Least z of a ray direction in front of a pinhole.
+
+/// A direction in the right camera, or its derivative by log-scale.
+struct Direction {
+  float x, y, z;
+};
 
 /// Intrinsics at a pyramid level.
 struct Intrinsics {
@@ -17,22 +22,25 @@ struct Intrinsics {
   float limit;
 };
 
-/// A point of the normalized plane and its derivative by log-scale.
+/// A point of the normalized plane and its derivative by log-scale. Nothing here branches: loops
+/// over it turn into vector code, and points without a projection are moved away at the end.
 struct Moving {
   float x, y, dx, dy;
-  bool valid;
+  float away;  ///< 0, or far away where there is no projection.
 };
 
+/// 0 for a positive margin, else far outside of every image.
+inline float away(float margin) { return kNowhere * (0.5F - std::copysign(0.5F, margin)); }
+
 /// q is the direction in the right camera, dq its derivative.
-inline Moving pinhole(const float q[3], const float dq[3]) {
-  const bool front = q[2] > kMinDepth;
-  const float iz = 1.0F / (front ? q[2] : 1.0F);
-  const float x = q[0] * iz;
-  const float y = q[1] * iz;
-  return {x, y, (dq[0] - x * dq[2]) * iz, (dq[1] - y * dq[2]) * iz, front};
+inline Moving pinhole(Direction q, Direction dq) {
+  const float iz = 1.0F / q.z;
+  const float x = q.x * iz;
+  const float y = q.y * iz;
+  return {x, y, (dq.x - x * dq.z) * iz, (dq.y - y * dq.z) * iz, away(q.z - kMinDepth)};
 }
 
-inline Moving radtan(const Intrinsics& c, const float q[3], const float dq[3]) {
+inline Moving radtan(const Intrinsics& c, Direction q, Direction dq) {
   const Moving m = pinhole(q, dq);
   const float* d = c.d;
   const float r2 = m.x * m.x + m.y * m.y;
@@ -49,10 +57,10 @@ inline Moving radtan(const Intrinsics& c, const float q[3], const float dq[3]) {
           m.y * g + d[2] * (r2 + 2.0F * m.y * m.y) + 2.0F * d[3] * m.x * m.y,
           m.dx * g + m.x * g_dot + 2.0F * d[2] * xy_dot + d[3] * (r2_dot + 4.0F * m.x * m.dx),
           m.dy * g + m.y * g_dot + d[2] * (r2_dot + 4.0F * m.y * m.dy) + 2.0F * d[3] * xy_dot,
-          m.valid && r2 < c.limit};
+          m.away + away(c.limit - r2)};
 }
 
-/// atan2(r, z) for r >= 0, to 2e-7 rad, without branches: halved argument, then the series.
+/// atan2(r, z) for r >= 0, to 5e-7 rad, without branches: halved argument, then the series.
 inline float angle_to_axis(float r, float z) {
   const float n = std::sqrt(r * r + z * z);
   const float low = r / (n + std::abs(z));  // tan of half the angle to the nearer half axis, <= 1
@@ -65,28 +73,29 @@ inline float angle_to_axis(float r, float z) {
                           a2 * (-1.0F / 7.0F +
                                 a2 * (1.0F / 9.0F + a2 * (-1.0F / 11.0F + a2 * (1.0F / 13.0F)))))));
   const float acute = 4.0F * series;
-  return z >= 0.0F ? acute : static_cast<float>(M_PI) - acute;
+  const float sign = std::copysign(1.0F, z);
+  return sign * acute + (1.0F - sign) * static_cast<float>(M_PI_2);
 }
 
-inline Moving equidistant(const Intrinsics& c, const float q[3], const float dq[3]) {
+inline Moving equidistant(const Intrinsics& c, Direction q, Direction dq) {
   const float* d = c.d;
-  const float r2 = q[0] * q[0] + q[1] * q[1] + 1e-12F;
+  const float r2 = q.x * q.x + q.y * q.y + 1e-12F;
   const float r = std::sqrt(r2);
   const float ir = 1.0F / r;
-  const float r_dot = (q[0] * dq[0] + q[1] * dq[1]) * ir;
-  const float theta = angle_to_axis(r, q[2]);
-  const float theta_dot = (r_dot * q[2] - r * dq[2]) / (r2 + q[2] * q[2]);
+  const float r_dot = (q.x * dq.x + q.y * dq.y) * ir;
+  const float theta = angle_to_axis(r, q.z);
+  const float theta_dot = (r_dot * q.z - r * dq.z) / (r2 + q.z * q.z);
   const float t2 = theta * theta;
   const float bent = theta * (1.0F + t2 * (d[0] + t2 * (d[1] + t2 * (d[2] + t2 * d[3]))));
   const float slope =
       1.0F + t2 * (3.0F * d[0] + t2 * (5.0F * d[1] + t2 * (7.0F * d[2] + t2 * 9.0F * d[3])));
   const float s = bent * ir;
   const float s_dot = (slope * theta_dot - s * r_dot) * ir;
-  return {s * q[0], s * q[1], s_dot * q[0] + s * dq[0], s_dot * q[1] + s * dq[1], theta < c.limit};
+  return {s * q.x, s * q.y, s_dot * q.x + s * dq.x, s_dot * q.y + s * dq.y, away(c.limit - theta)};
 }
 
 template <Distortion D>
-inline Moving distorted(const Intrinsics& c, const float q[3], const float dq[3]) {
+inline Moving distorted(const Intrinsics& c, Direction q, Direction dq) {
   if constexpr (D == Distortion::kEquidistant) return equidistant(c, q, dq);
   if constexpr (D == Distortion::kRadtan) return radtan(c, q, dq);
   return pinhole(q, dq);
@@ -96,27 +105,28 @@ inline Moving distorted(const Intrinsics& c, const float q[3], const float dq[3]
 template <Distortion D>
 void project_all(const Intrinsics c, const ScalePoints& points, float inverse_scale,
                  ScaleProjections* out) {
-  const float* __restrict mx = points.mx.data();
-  const float* __restrict my = points.my.data();
-  const float* __restrict mz = points.mz.data();
-  const float* __restrict rho = points.inverse_depth.data();
-  float* __restrict x = out->x.data();
-  float* __restrict y = out->y.data();
-  float* __restrict jx = out->jx.data();
-  float* __restrict jy = out->jy.data();
+  const float* mx = points.mx.data();
+  const float* my = points.my.data();
+  const float* mz = points.mz.data();
+  const float* rho = points.inverse_depth.data();
+  float* x = out->x.data();
+  float* y = out->y.data();
+  float* jx = out->jx.data();
+  float* jy = out->jy.data();
   const float tx = points.t[0];
   const float ty = points.t[1];
   const float tz = points.t[2];
   const int n = points.padded;
+#pragma GCC ivdep
   for (int i = 0; i < n; ++i) {
     const float w = rho[i] * inverse_scale;
-    const float dq[3] = {-w * tx, -w * ty, -w * tz};
-    const float q[3] = {mx[i] - dq[0], my[i] - dq[1], mz[i] - dq[2]};
+    const Direction dq = {-w * tx, -w * ty, -w * tz};
+    const Direction q = {mx[i] - dq.x, my[i] - dq.y, mz[i] - dq.z};
     const Moving m = distorted<D>(c, q, dq);
-    x[i] = m.valid ? c.fx * m.x + c.cx : kNowhere;
-    y[i] = m.valid ? c.fy * m.y + c.cy : kNowhere;
-    jx[i] = m.valid ? c.fx * m.dx : 0.0F;
-    jy[i] = m.valid ? c.fy * m.dy : 0.0F;
+    x[i] = c.fx * m.x + c.cx + m.away;
+    y[i] = c.fy * m.y + c.cy + m.away;
+    jx[i] = c.fx * m.dx;
+    jy[i] = c.fy * m.dy;
   }
 }
 

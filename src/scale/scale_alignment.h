@@ -36,7 +36,7 @@ struct ScaleSums {
   double count = 0.0;
 };
 
-/// Everything that an optimization stores; kept between calls to save the allocation.
+/// Everything that an alignment stores; kept between calls to save the allocation.
 struct ScaleWorkspace {
   ScalePoints points;
   ScaleProjections projections;

@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kMinBaseline = 1e-6;  ///< [m]
 constexpr int kAcrossLevel = 2;        ///< Where displacement across the epipolar curve is taken.
+constexpr int kSparsePoints = 600;     ///< Of the finer grid of a cold start.
 constexpr double kEdgeOfRange = 0.02;  ///< Of the search, in log-scale.
 
 /// Gauss-Newton from the level of the start to level 0.
@@ -55,29 +56,47 @@ ScaleVerdict judge(const ScaleOptimizerConfig& config, const ScaleEstimate& esti
   return ScaleVerdict::kAccepted;
 }
 
-ScaleEstimate estimate_robust_scale(const ScaleOptimizerConfig& config,
-                                    const RightProjection& projection,
-                                    const KeyframeSnapshot& keyframe, const ImagePyramid& right,
-                                    bool cold_start, ScaleWorkspace* workspace) {
+/// What an estimate works with.
+struct Task {
+  const ScaleOptimizerConfig& config;
+  const RightProjection& projection;
+  const ImagePyramid& left;
+  const ImagePyramid& right;
+  ScaleWorkspace* workspace;
+  ScaleWorkspace* sparse;
+};
+
+/// Start over the whole range; false when nothing can be compared.
+bool start_cold(const Task& task, int coarsest_level, ScaleAlignment* alignment,
+                ScaleEstimate* out) {
+  const ScalePoints& points = task.workspace->points;
+  const int stride = std::max(1, points.size / kSparsePoints);
+  task.sparse->points.take_every(stride, points);
+  ScaleAlignment sparse(task.config, task.projection, task.left, task.right, task.sparse);
+  const ScaleSearch found = search_scale(
+      task.config, coarsest_level, {points.size, task.sparse->points.size}, &sparse, alignment);
+  out->log_scale = found.sigma;
+  out->ambiguity = found.ambiguity;
+  out->iterations = found.iterations;
+  alignment->restart();
+  return found.found;
+}
+
+ScaleEstimate estimate_robust_scale(const Task& task, bool cold_start) {
   ScaleEstimate out;
-  const int top = std::min(keyframe.pyramid->num_levels(), right.num_levels()) - 1;
-  ScaleAlignment alignment(config, projection, *keyframe.pyramid, right, workspace);
-  int level = std::min(config.tracking_level, top);
-  if (cold_start) {
-    const int coarsest = std::min(config.cold_level, top);
-    const ScaleSearch found = search_scale(config, workspace->points.size, coarsest, &alignment);
-    if (!found.found) return out;
-    out.log_scale = found.sigma;
-    out.ambiguity = found.ambiguity;
-    out.iterations = found.iterations;
-    level = std::min(level, coarsest);
-    alignment.restart();
+  const ScaleOptimizerConfig& config = task.config;
+  const int size = task.workspace->points.size;
+  const int top = std::min(task.left.num_levels(), task.right.num_levels()) - 1;
+  ScaleAlignment alignment(config, task.projection, task.left, task.right, task.workspace);
+  const int level = std::min(config.tracking_level, top);
+  if (cold_start && !start_cold(task, std::min(config.cold_level, top), &alignment, &out)) {
+    return out;
   }
   const bool aligned = descend(config, level, &alignment, &out);
   out.num_points = alignment.used();
   out.gain = static_cast<double>(alignment.brightness().gain);
   out.bias = static_cast<double>(alignment.brightness().bias);
-  out.verdict = observability(config, alignment, workspace->points.size);
+  out.verdict = observability(config, alignment, size);
   if (!aligned && out.verdict == ScaleVerdict::kAccepted) out.verdict = ScaleVerdict::kUnobservable;
   if (out.verdict != ScaleVerdict::kAccepted) return out;
   const ScaleSums sums = alignment.sums();
@@ -116,7 +135,8 @@ ScaleOptimizer::ScaleOptimizer(const ScaleOptimizerConfig& config, const StereoR
     : config_(config),
       rig_(rig),
       projection_(std::make_unique<RightProjection>(rig.right)),
-      workspace_(std::make_unique<ScaleWorkspace>()) {}
+      workspace_(std::make_unique<ScaleWorkspace>()),
+      sparse_workspace_(std::make_unique<ScaleWorkspace>()) {}
 
 ScaleOptimizer::~ScaleOptimizer() = default;
 ScaleOptimizer::ScaleOptimizer(ScaleOptimizer&& other) noexcept = default;
@@ -138,8 +158,9 @@ ScaleEstimate ScaleOptimizer::estimate(const KeyframeSnapshot& keyframe, const I
   if (config_.method == ScaleMethod::kPaper) {
     return estimate_paper_scale(config_, rig_, keyframe, right, cold_start, workspace_.get());
   }
-  return estimate_robust_scale(config_, *projection_, keyframe, right, cold_start,
-                               workspace_.get());
+  const Task task{config_, *projection_,     *keyframe.pyramid,
+                  right,   workspace_.get(), sparse_workspace_.get()};
+  return estimate_robust_scale(task, cold_start);
 }
 
 }  // namespace sovo

@@ -137,6 +137,7 @@ class ScaleOptimizer {
   StereoRig rig_;
   std::unique_ptr<RightProjection> projection_;
   std::unique_ptr<ScaleWorkspace> workspace_;
+  std::unique_ptr<ScaleWorkspace> sparse_workspace_;
 };
 
 }  // namespace sovo

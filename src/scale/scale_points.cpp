@@ -1,6 +1,7 @@
 #include "sovo/scale/scale_points.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "sovo/image/interpolation.h"
@@ -8,6 +9,12 @@
 namespace sovo {
 
 namespace {
+
+constexpr std::array kArrays = {&ScalePoints::u,         &ScalePoints::v,
+                                &ScalePoints::mx,        &ScalePoints::my,
+                                &ScalePoints::mz,        &ScalePoints::inverse_depth,
+                                &ScalePoints::reference, &ScalePoints::relative_variance,
+                                &ScalePoints::visible};
 
 bool usable(const KeyframePoints& points, std::size_t i) {
   return points.inverse_depth[i] > 0.0F && std::isfinite(points.inverse_depth[i]) &&
@@ -25,9 +32,7 @@ void ScalePoints::prepare(const KeyframeSnapshot& keyframe, const StereoRig& rig
                           double min_relative_sigma) {
   const KeyframePoints& points = keyframe.points;
   const auto n = static_cast<std::size_t>(padded_size(points.size()));
-  for (auto* array : {&u, &v, &mx, &my, &mz, &inverse_depth, &relative_variance, &reference}) {
-    array->assign(n, 1.0F);
-  }
+  for (const auto array : kArrays) (this->*array).assign(n, 1.0F);
   visible.assign(n, 0.0F);
   const Mat3 r = rig.T_right_left.rotation_matrix();
   const Vec3 translation = rig.T_right_left.translation();
@@ -52,6 +57,21 @@ void ScalePoints::prepare(const KeyframeSnapshot& keyframe, const StereoRig& rig
   }
   size = static_cast<int>(k);
   padded = padded_size(k);
+}
+
+void ScalePoints::take_every(int stride, const ScalePoints& all) {
+  size = all.size / stride;
+  padded = padded_size(static_cast<std::size_t>(size));
+  std::copy(all.t, all.t + 3, t);
+  for (const auto array : kArrays) {
+    const AlignedVector<float>& source = all.*array;
+    AlignedVector<float>& target = this->*array;
+    target.assign(static_cast<std::size_t>(padded), 1.0F);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(size); ++i) {
+      target[i] = source[i * static_cast<std::size_t>(stride)];
+    }
+  }
+  std::fill(visible.begin() + size, visible.end(), 0.0F);
 }
 
 void ScalePoints::sample_reference(const ImageF& left, int level) {

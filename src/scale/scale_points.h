@@ -27,6 +27,9 @@ struct ScalePoints {
   /// Takes over the points of a keyframe; those without a positive finite depth are left out.
   void prepare(const KeyframeSnapshot& keyframe, const StereoRig& rig, double min_relative_sigma);
 
+  /// Every `stride`-th point of `all`.
+  void take_every(int stride, const ScalePoints& all);
+
   /// Samples `reference` from the left image of pyramid level `level`.
   void sample_reference(const ImageF& left, int level);
 };

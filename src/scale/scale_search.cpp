@@ -8,9 +8,9 @@ namespace sovo {
 
 namespace {
 
-constexpr double kMinStep = 0.01;  ///< Of the grid: a shift as large as the image.
+constexpr double kMinStep = 0.004;  ///< Of the grid: a pixel where points cross half the image.
 constexpr double kMaxStep = 0.06;
-constexpr std::size_t kMaxModes = 4;
+constexpr int kMaxModes = 4;        ///< Refined, of each level's grid.
 constexpr double kSameMode = 0.05;  ///< Minima closer than this are one [log-scale].
 constexpr double kMinShift = 2.0;   ///< Of the points that compare modes [px].
 
@@ -19,9 +19,12 @@ struct Mode {
   double score = -1.0;
 };
 
-/// Correlation over the whole range.
-std::vector<Mode> scan(const ScaleOptimizerConfig& config, int min_count,
+/// Correlation over the whole range on one level.
+std::vector<Mode> scan(const ScaleOptimizerConfig& config, int level, int num_points,
                        ScaleAlignment* alignment) {
+  alignment->set_level(level);
+  const int min_count = std::max(std::min(num_points, config.min_points / 2),
+                                 static_cast<int>(config.min_visible * num_points));
   std::vector<Mode> grid;
   double sigma = config.min_log_scale;
   while (sigma <= config.max_log_scale) {
@@ -29,6 +32,11 @@ std::vector<Mode> scan(const ScaleOptimizerConfig& config, int min_count,
     sigma += std::clamp(1.0 / (1.5 * alignment->mean_shift() + 1e-9), kMinStep, kMaxStep);
   }
   return grid;
+}
+
+void sort_by_score(std::vector<Mode>* modes) {
+  std::stable_sort(modes->begin(), modes->end(),
+                   [](const Mode& a, const Mode& b) { return a.score > b.score; });
 }
 
 /// Local maxima, best first; the ends of the range count.
@@ -39,23 +47,24 @@ std::vector<Mode> modes_of(const std::vector<Mode>& grid) {
     const bool above_right = i + 1 == grid.size() || grid[i].score >= grid[i + 1].score;
     if (above_left && above_right && grid[i].score > 0.0) modes.push_back(grid[i]);
   }
-  std::stable_sort(modes.begin(), modes.end(),
-                   [](const Mode& a, const Mode& b) { return a.score > b.score; });
+  sort_by_score(&modes);
   if (modes.size() > kMaxModes) modes.resize(kMaxModes);
   return modes;
 }
 
-/// Gauss-Newton from a mode of the grid down to level 1.
-void refine(int coarsest_level, ScaleAlignment* alignment, Mode* mode, int* iterations) {
+/// Gauss-Newton from a mode of the grid.
+void refine(int coarsest_level, int finest_level, ScaleAlignment* alignment, Mode* mode,
+            int* iterations) {
   alignment->restart();
   double sigma = mode->sigma;
-  for (int level = coarsest_level; level >= std::min(1, coarsest_level); --level) {
+  for (int level = coarsest_level; level >= finest_level; --level) {
     alignment->set_level(level);
     if (!alignment->minimize(1e-3 * (1 << level), &sigma, iterations)) return;
     mode->sigma = sigma;
   }
 }
 
+/// How much better the best of sorted modes explains the images than the next that is another.
 double ambiguity_of(const std::vector<Mode>& modes) {
   for (std::size_t i = 1; i < modes.size(); ++i) {
     if (std::abs(modes[i].sigma - modes[0].sigma) < kSameMode) continue;
@@ -66,22 +75,24 @@ double ambiguity_of(const std::vector<Mode>& modes) {
 
 }  // namespace
 
-ScaleSearch search_scale(const ScaleOptimizerConfig& config, int num_points, int coarsest_level,
+ScaleSearch search_scale(const ScaleOptimizerConfig& config, int coarsest_level,
+                         const ScalePointCounts& counts, ScaleAlignment* sparse,
                          ScaleAlignment* alignment) {
   ScaleSearch out;
-  const int min_count =
-      std::max(config.min_points / 2, static_cast<int>(config.min_visible * num_points));
-  alignment->set_level(coarsest_level);
-  std::vector<Mode> modes = modes_of(scan(config, min_count, alignment));
+  const int finest_level = std::min(1, coarsest_level);
+  std::vector<Mode> modes = modes_of(scan(config, coarsest_level, counts.all, alignment));
+  for (Mode& mode : modes) refine(coarsest_level, finest_level, alignment, &mode, &out.iterations);
+  // Fine texture that repeats is flat on the coarse level: its modes show only here.
+  std::vector<Mode> fine = modes_of(scan(config, finest_level, counts.sparse, sparse));
+  for (Mode& mode : fine) refine(finest_level, finest_level, alignment, &mode, &out.iterations);
+  modes.insert(modes.end(), fine.begin(), fine.end());
   if (modes.empty()) return out;
-  for (Mode& mode : modes) {
-    refine(coarsest_level, alignment, &mode, &out.iterations);
-  }
-  alignment->set_level(std::min(1, coarsest_level));
+
+  alignment->set_level(finest_level);
+  sort_by_score(&modes);
   alignment->hide_unmoved(modes[0].sigma, kMinShift);
   for (Mode& mode : modes) mode.score = alignment->correlation(mode.sigma, config.min_points / 4);
-  std::stable_sort(modes.begin(), modes.end(),
-                   [](const Mode& a, const Mode& b) { return a.score > b.score; });
+  sort_by_score(&modes);
   out.found = true;
   out.sigma = modes[0].sigma;
   out.ambiguity = ambiguity_of(modes);

@@ -12,10 +12,17 @@ struct ScaleSearch {
   int iterations = 0;
 };
 
-/// Cold start: correlation over a grid of log-scales on a coarse level, with steps that move points
-/// by less than a pixel there; the best modes are then refined down to level 1 and compared on the
-/// points that can tell scales apart.
-ScaleSearch search_scale(const ScaleOptimizerConfig& config, int num_points, int coarsest_level,
+/// How many points the alignments of a search hold.
+struct ScalePointCounts {
+  int all, sparse;
+};
+
+/// Cold start: correlation over grids of log-scales, whose steps move points by less than a pixel,
+/// on a coarse level with all points and on level 1 with the sparse ones (`sparse` holds a part of
+/// the points of `alignment`). The best modes of both are refined down to level 1 and compared on
+/// the points that can tell scales apart.
+ScaleSearch search_scale(const ScaleOptimizerConfig& config, int coarsest_level,
+                         const ScalePointCounts& counts, ScaleAlignment* sparse,
                          ScaleAlignment* alignment);
 
 }  // namespace sovo

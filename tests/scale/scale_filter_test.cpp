@@ -1,0 +1,237 @@
+#include "sovo/scale/scale_filter.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "support/synthetic_scene.h"
+
+namespace sovo {
+namespace {
+
+ScaleMeasurement measure(double log_scale, double sigma, bool cold = false,
+                         ScaleVerdict verdict = ScaleVerdict::kAccepted) {
+  ScaleMeasurement m;
+  m.estimate.log_scale = log_scale;
+  m.estimate.sigma = sigma;
+  m.estimate.verdict = verdict;
+  m.cold_start = cold;
+  m.distance = 0.1;
+  return m;
+}
+
+ScaleFilter locked_filter(const ScaleFilterConfig& config = {}) {
+  ScaleFilter filter(config);
+  filter.lock_initial(0.02, 0);
+  return filter;
+}
+
+TEST(ScaleFilter, NothingIsAppliedBeforeTheLock) {
+  ScaleFilter filter({});
+  EXPECT_FALSE(filter.locked());
+  EXPECT_TRUE(filter.wants_cold_start());
+  EXPECT_FALSE(filter.update(measure(0.3, 0.001)).apply);  // not a cold start
+  EXPECT_FALSE(filter.update(measure(0.3, 0.001, true, ScaleVerdict::kOutOfRange)).apply);
+  EXPECT_FALSE(filter.locked());
+}
+
+TEST(ScaleFilter, AnUnambiguousColdStartLocks) {
+  ScaleFilter filter({});
+  const ScaleUpdate update = filter.update(measure(1.7, 0.002, true));
+  EXPECT_TRUE(update.apply);
+  EXPECT_DOUBLE_EQ(update.log_scale_correction, 1.7);
+  EXPECT_TRUE(filter.locked());
+  EXPECT_FALSE(filter.wants_cold_start());
+  EXPECT_NEAR(filter.sigma(), 0.002, 1e-12);
+}
+
+TEST(ScaleFilter, AmbiguousColdStartsLockWhenTwoAgree) {
+  ScaleFilter filter({});
+  const auto ambiguous = [](double s) { return measure(s, 0.002, true, ScaleVerdict::kAmbiguous); };
+  EXPECT_FALSE(filter.update(ambiguous(1.0)).apply);
+  EXPECT_FALSE(filter.update(ambiguous(1.4)).apply);  // disagrees
+  EXPECT_FALSE(filter.locked());
+  const ScaleUpdate update = filter.update(ambiguous(1.401));
+  EXPECT_TRUE(update.apply);
+  EXPECT_EQ(update.verdict, ScaleVerdict::kAccepted);
+  EXPECT_TRUE(filter.locked());
+}
+
+TEST(ScaleFilter, ConvergesToTheScale) {
+  ScaleFilter filter = locked_filter();
+  double error = 0.03;
+  for (int i = 0; i < 10; ++i) error -= filter.update(measure(error, 0.003)).log_scale_correction;
+  EXPECT_LT(std::abs(error), 1e-5);
+  EXPECT_LT(filter.sigma(), 0.004);
+}
+
+TEST(ScaleFilter, PendingCorrectionsAreNotAppliedTwice) {
+  ScaleFilter filter = locked_filter();
+  const double first = filter.update(measure(0.02, 0.001)).log_scale_correction;
+  ScaleMeasurement m = measure(0.02, 0.001);
+  m.pending_log_scale = first;  // the snapshot was made before the first was applied
+  const ScaleUpdate second = filter.update(m);
+  EXPECT_NEAR(first + second.log_scale_correction, 0.02, 1e-4);
+  EXPECT_NEAR(second.innovation, 0.02 - first, 1e-12);
+}
+
+TEST(ScaleFilter, ConstantDriftLeavesLittleBias) {
+  // 0.4 % of drift a keyframe under 0.3 % of noise: a gain K leaves 0.4 % (1 - K) / K.
+  ScaleFilter filter = locked_filter();
+  std::mt19937 random(5);
+  double error = 0.0;
+  double bias = 0.0;
+  double square = 0.0;
+  double gain = 0.0;
+  int counted = 0;
+  for (int i = 0; i < 2000; ++i) {
+    error += 0.004;
+    const ScaleUpdate update = filter.update(measure(error + 0.003 * test::normal(random), 0.003));
+    error -= update.log_scale_correction;
+    if (i < 200) continue;
+    bias += error;
+    square += error * error;
+    gain += update.gain;
+    ++counted;
+  }
+  bias /= counted;
+  gain /= counted;
+  RecordProperty("bias", std::to_string(bias));
+  RecordProperty("gain", std::to_string(gain));
+  RecordProperty("rms", std::to_string(std::sqrt(square / counted)));
+  EXPECT_NEAR(bias, 0.004 * (1.0 - gain) / gain, 3e-4);
+  EXPECT_LT(bias, 0.0015);
+  EXPECT_LT(std::sqrt(square / counted), 0.0035);
+}
+
+TEST(ScaleFilter, AnOutlierIsGated) {
+  ScaleFilter filter = locked_filter();
+  for (int i = 0; i < 20; ++i) filter.update(measure(0.0, 0.001));
+  const ScaleUpdate update = filter.update(measure(0.2, 0.001));
+  EXPECT_FALSE(update.apply);
+  EXPECT_EQ(update.verdict, ScaleVerdict::kInnovation);
+  EXPECT_EQ(filter.last_verdict(), ScaleVerdict::kInnovation);
+  EXPECT_EQ(filter.disagreements(), 1);
+  EXPECT_TRUE(filter.update(measure(0.001, 0.001)).apply);
+  EXPECT_EQ(filter.disagreements(), 0);
+}
+
+TEST(ScaleFilter, SixDisagreementsAskForAColdStart) {
+  ScaleFilter filter = locked_filter();
+  for (int i = 0; i < 20; ++i) filter.update(measure(0.0, 0.001));
+  for (int i = 0; i < 6; ++i) {
+    EXPECT_FALSE(filter.wants_cold_start());
+    filter.update(measure(0.4, 0.001));
+  }
+  EXPECT_TRUE(filter.wants_cold_start());
+  EXPECT_TRUE(filter.locked());
+  const ScaleUpdate update = filter.update(measure(0.4, 0.001, true));
+  EXPECT_TRUE(update.apply);
+  EXPECT_DOUBLE_EQ(update.log_scale_correction, 0.4);
+  EXPECT_FALSE(filter.wants_cold_start());
+}
+
+TEST(ScaleFilter, AColdStartThatAgreesEndsTheDoubt) {
+  ScaleFilter filter = locked_filter();
+  for (int i = 0; i < 6; ++i) {
+    filter.update(measure(0.0, 0.001, false, ScaleVerdict::kTooFewInliers));
+  }
+  EXPECT_TRUE(filter.wants_cold_start());
+  EXPECT_TRUE(filter.update(measure(0.002, 0.001, true)).apply);
+  EXPECT_FALSE(filter.wants_cold_start());
+}
+
+TEST(ScaleFilter, MissesCountNeitherForNorAgainst) {
+  ScaleFilter filter = locked_filter();
+  for (int i = 0; i < 20; ++i) filter.update(measure(0.0, 0.001));
+  for (int i = 0; i < 5; ++i) filter.update(measure(0.4, 0.001));
+  const double before = filter.sigma();
+  for (const ScaleVerdict miss :
+       {ScaleVerdict::kTooFewPoints, ScaleVerdict::kUnobservable, ScaleVerdict::kNoRightImage}) {
+    for (int i = 0; i < 10; ++i) EXPECT_FALSE(filter.update(measure(0, 0, false, miss)).apply);
+  }
+  EXPECT_EQ(filter.disagreements(), 5);
+  EXPECT_FALSE(filter.wants_cold_start());
+  EXPECT_GT(filter.sigma(), before);  // the scale walks on unseen
+  EXPECT_EQ(filter.last_verdict(), ScaleVerdict::kNoRightImage);
+}
+
+TEST(ScaleFilter, AgeCountsFromTheLastAcceptedKeyframe) {
+  ScaleFilter filter = locked_filter();
+  ScaleMeasurement m = measure(0.0, 0.001);
+  m.stamp_ns = 2'000'000'000;
+  filter.update(m);
+  m = measure(0.0, 0.001, false, ScaleVerdict::kUnobservable);
+  m.stamp_ns = 3'000'000'000;
+  filter.update(m);
+  EXPECT_DOUBLE_EQ(filter.age_s(3'500'000'000), 1.5);
+}
+
+/// Mean of error^2 / sigma^2 over a random walk, and of the summed error over the path's sigma.
+struct Consistency {
+  double nees = 0.0;
+  double path_nees = 0.0;
+};
+
+Consistency simulate(double correlation, double shared, double q_true) {
+  Consistency out;
+  const int runs = 60;
+  const int keyframes = 200;
+  for (unsigned run = 0; run < runs; ++run) {
+    std::mt19937 random(run + 1);
+    ScaleFilter filter = locked_filter();
+    double error = 0.02 * test::normal(random);
+    double noise = test::normal(random);
+    double sum = 0.0;
+    double variance = 0.0;
+    for (int i = 0; i < keyframes; ++i) {
+      error += std::sqrt(0.1 * q_true) * test::normal(random);
+      noise =
+          correlation * noise + std::sqrt(1.0 - correlation * correlation) * test::normal(random);
+      ScaleMeasurement m = measure(error + 0.003 * noise, 0.003);
+      m.shared_points = shared;
+      error -= filter.update(m).log_scale_correction;
+      sum += error;
+      variance += filter.path_sigma() * filter.path_sigma();
+      out.nees += error * error / (filter.sigma() * filter.sigma()) / (runs * keyframes);
+    }
+    out.path_nees += sum * sum / variance / runs;
+  }
+  return out;
+}
+
+TEST(ScaleFilter, SigmaIsHonest) {
+  for (const double q : {1e-4, 3e-4, 1e-3}) {
+    const Consistency found = simulate(0.0, 0.0, q);
+    EXPECT_GT(found.nees, 0.6) << q;
+    EXPECT_LT(found.nees, 1.6) << q;
+    EXPECT_GT(found.path_nees, 0.4) << q;
+    EXPECT_LT(found.path_nees, 2.5) << q;  // the process noise is still being learned
+  }
+}
+
+TEST(ScaleFilter, SigmaCountsCorrelationOfSharedPoints) {
+  const Consistency found = simulate(0.7, 0.7 / 0.85, 3e-4);
+  EXPECT_GT(found.nees, 0.4);
+  EXPECT_LT(found.nees, 1.8);
+  EXPECT_GT(found.path_nees, 0.4);
+  EXPECT_LT(found.path_nees, 2.5);
+}
+
+TEST(ScaleFilter, LearnsTheProcessNoiseWithinBounds) {
+  ScaleFilterConfig config;
+  std::mt19937 random(2);
+  ScaleFilter restless = locked_filter(config);
+  for (int i = 0; i < 400; ++i) restless.update(measure(0.03 * test::normal(random), 0.001));
+  EXPECT_GT(restless.process_noise(), 3.0 * config.process_noise);
+  EXPECT_LE(restless.process_noise(), config.max_process_noise);
+  ScaleFilter calm = locked_filter(config);
+  for (int i = 0; i < 400; ++i) calm.update(measure(0.0, 0.001));
+  EXPECT_DOUBLE_EQ(calm.process_noise(), config.min_process_noise);
+  calm.reset();
+  EXPECT_FALSE(calm.locked());
+  EXPECT_DOUBLE_EQ(calm.process_noise(), config.min_process_noise);
+}
+
+}  // namespace
+}  // namespace sovo

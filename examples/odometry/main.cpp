@@ -1,19 +1,35 @@
+#include <cmath>
 #include <cstdio>
 
-#include "sovo/geometry/stereo_rig.h"
+#include "painted_wall.h"
+#include "sovo/odometry/stereo_odometry.h"
 
-/// Where a point three metres ahead appears in both cameras of a rig.
+struct Printer : sovo::OutputSink {
+  void on_frame(const sovo::OdometryOutput& output) override {
+    x = output.pose_valid ? output.T_odom_left.translation().x() : NAN;
+    std::printf("%s: x = %.4f m\n", to_string(output.state).c_str(), x);
+  }
+  void on_keyframe(const sovo::KeyframeOutput& /*keyframe*/) override {}
+  void on_scale(const sovo::ScaleRecord& /*record*/) override {}
+  double x = NAN;
+};
+
+/// A stereo rig of 10 cm baseline moves 2 cm to the right between two pairs; the odometry says so.
 int main() {
-  sovo::StereoRig rig;
-  rig.left = {.width = 640, .height = 480, .fx = 400, .fy = 400, .cx = 319.5, .cy = 239.5};
-  rig.right = rig.left;
-  rig.T_right_left.translation().x() = -0.1;
+  sovo::StereoCameras cameras;
+  cameras.rig.left = cameras.rig.right = wall_camera();
+  cameras.rig.T_right_left.translation().x() = -0.1;
 
-  const sovo::Vec3 point(0.2, -0.1, 3.0);
-  const auto left = rig.left.project(point);
-  const auto right = rig.right.project(rig.T_right_left * point);
-  if (!left || !right) return 1;
-  std::printf("left (%.2f, %.2f), right (%.2f, %.2f), disparity %.2f px\n", left->x(), left->y(),
-              right->x(), right->y(), left->x() - right->x());
-  return 0;
+  Printer printer;
+  sovo::StereoOdometry odometry({.deterministic = true}, cameras, &printer);
+  for (int i = 0; i < 2; ++i) {
+    sovo::StereoFrame frame;
+    frame.stamp_ns = 50'000'000 * i;
+    frame.sequence = i;
+    frame.left = photograph(0.02 * i);
+    frame.right = photograph(0.02 * i + 0.1);
+    odometry.process(frame);
+  }
+  odometry.finish();
+  return std::abs(printer.x - 0.02) < 0.001 ? 0 : 1;
 }

@@ -184,15 +184,17 @@ void PatchTracker::follow(const ImagePyramid& pyramid, const float A[4], std::si
     for (int iteration = 0; iteration < config_.max_iterations; ++iteration) {
       ok = sample_patch(pyramid[l], x, y, A, values);
       if (!ok) break;
+      // Contrast of this patch: a wrong one would pull the patch along its gradient.
+      const float gain = std::clamp(norm(values) / patch.norm, 0.2F, 5.0F);
       float bx = 0.0F, by = 0.0F;
       for (int k = 0; k < kSize; ++k) {
-        const float r = values[k] - gain_ * patch.value[k];
+        const float r = values[k] - gain * patch.value[k];
         bx += patch.gx[k] * r;
         by += patch.gy[k] * r;
       }
       const float* h = patch.inverse_hessian;
-      const float sx = -(h[0] * bx + h[1] * by) / gain_;
-      const float sy = -(h[1] * bx + h[2] * by) / gain_;
+      const float sx = -(h[0] * bx + h[1] * by) / gain;
+      const float sy = -(h[1] * bx + h[2] * by) / gain;
       float dx = A[0] * sx + A[1] * sy;
       float dy = A[2] * sx + A[3] * sy;
       const float length = std::sqrt(dx * dx + dy * dy);

@@ -17,16 +17,16 @@ namespace sovo {
 struct TwoViewInitializerConfig {
   int wanted_points = 2000;          ///< Pixels selected in the first frame.
   int min_matches = 60;              ///< Fewest followed patches.
-  double min_parallax_deg = 1.0;     ///< Median angle left after the best rotation [deg].
+  double min_parallax_deg = 0.8;     ///< Median angle left after the best rotation [deg].
   double min_inlier_share = 0.7;     ///< Of the followed patches, on one epipolar geometry.
-  double max_direction_deg = 1.5;    ///< Standard deviation of the translation's direction [deg].
-  double max_depth_error = 0.15;     ///< Median relative error of inverse depth per 0.5 px.
+  double max_direction_deg = 0.25;   ///< Standard deviation of the translation's direction [deg].
+  double max_depth_error = 0.03;     ///< Median relative error of inverse depth per 0.5 px.
   double rotation_cost_ratio = 4.0;  ///< Rotation alone must cost this times as much.
   double min_in_front = 0.9;         ///< Share of inliers with positive depth.
   double max_rms = 14.0;             ///< Of the photometric residual after refinement [grey].
   double max_energy = 144.0;         ///< A point's mean robust squared residual [grey^2].
   double min_points_share = 0.3;     ///< Of the selected pixels, with a depth.
-  int max_frames = 100;              ///< Failed when not ready after so many frames.
+  int max_frames = 40;               ///< Failed when not ready after so many frames.
   int max_lost_frames = 5;           ///< Failed after so many frames with too few matches.
   PatchTrackerConfig tracker;
   EpipolarPoseConfig epipolar;

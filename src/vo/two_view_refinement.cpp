@@ -241,9 +241,30 @@ double refine_two_views(const ImagePyramid& first, const ImagePyramid& second,
   return rms;
 }
 
+namespace {
+
+/// Sum of truncated squared residuals of the pattern; infinity when it leaves the second view.
+float pattern_energy(const ImageF& first, const ImageF& second, const CameraModel& camera,
+                     const TwoViewState& state, float u, float v, float inverse_depth) {
+  float energy = 0.0F;
+  for (const auto& offset : kPattern) {
+    TwoViewPixel pixel;
+    if (!evaluate_pixel(first, second, camera, state, u + offset[0], v + offset[1], inverse_depth,
+                        &pixel)) {
+      return std::numeric_limits<float>::infinity();
+    }
+    energy += std::min(pixel.residual * pixel.residual, 900.0F);
+  }
+  return energy;
+}
+
+}  // namespace
+
 bool search_inverse_depth(const ImageF& first, const ImageF& second, const CameraModel& camera,
                           const TwoViewState& state, float low, float high, TwoViewPoint* point) {
   constexpr int kMaxSteps = 80;
+  constexpr float kNoiseEnergy = 8.0F * 16.0F;  // noise of 4 grey levels in each pixel
+  constexpr float kUniqueness = 1.5F;           // least energy of any other match, relative
   const Vec3 ray((point->u - camera.cx) / camera.fx, (point->v - camera.cy) / camera.fy, 1.0);
   const auto project = [&](float rho) {
     const Vec3 P = state.T_1_0.rotation() * ray + rho * state.T_1_0.translation();
@@ -251,26 +272,24 @@ bool search_inverse_depth(const ImageF& first, const ImageF& second, const Camer
   };
   const double length = (project(high) - project(low)).norm();
   const int steps = std::clamp(static_cast<int>(std::ceil(length)), 1, kMaxSteps);
-  float best = std::numeric_limits<float>::infinity();
-  float best_rho = low;
+  std::array<float, kMaxSteps + 1> energies{};
+  int best = 0;
   for (int i = 0; i <= steps; ++i) {
     const float rho = low + (high - low) * static_cast<float>(i) / static_cast<float>(steps);
-    float energy = 0.0F;
-    for (const auto& offset : kPattern) {
-      TwoViewPixel pixel;
-      if (!evaluate_pixel(first, second, camera, state, point->u + offset[0], point->v + offset[1],
-                          rho, &pixel)) {
-        energy = std::numeric_limits<float>::infinity();
-        break;
-      }
-      energy += std::min(pixel.residual * pixel.residual, 900.0F);
-    }
-    if (energy < best) {
-      best = energy;
-      best_rho = rho;
+    energies[static_cast<std::size_t>(i)] =
+        pattern_energy(first, second, camera, state, point->u, point->v, rho);
+    if (energies[static_cast<std::size_t>(i)] < energies[static_cast<std::size_t>(best)]) best = i;
+  }
+  const float lowest = energies[static_cast<std::size_t>(best)];
+  if (!std::isfinite(lowest)) return false;
+  for (int i = 0; i <= steps; ++i) {
+    if (std::abs(i - best) <= 2) continue;
+    if (energies[static_cast<std::size_t>(i)] + kNoiseEnergy <
+        kUniqueness * (lowest + kNoiseEnergy)) {
+      return false;
     }
   }
-  if (!std::isfinite(best)) return false;
+  const float best_rho = low + (high - low) * static_cast<float>(best) / static_cast<float>(steps);
   point->inverse_depth = best_rho;
   return true;
 }

@@ -63,7 +63,8 @@ double refine_two_views(const ImagePyramid& first, const ImagePyramid& second,
                         int coarsest, TwoViewState* state, std::vector<TwoViewPoint>* points);
 
 /// Looks along the epipolar line between the inverse depths `low` and `high`, pixel by pixel, and
-/// takes the best match of the pattern at level 0. False when no sample is in view.
+/// takes the best match of the pattern at level 0. False when no sample is in view, or when another
+/// one away from the best is almost as good.
 bool search_inverse_depth(const ImageF& first, const ImageF& second, const CameraModel& camera,
                           const TwoViewState& state, float low, float high, TwoViewPoint* point);
 

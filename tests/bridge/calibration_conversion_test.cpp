@@ -1,0 +1,78 @@
+#include "sovo/bridge/calibration_conversion.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+
+#include "sovo/bridge/borrow.h"
+#include "test_cameras.h"
+
+namespace sovo::bridge {
+namespace {
+
+TEST(CalibrationConversion, ThereAndBack) {
+  const StereoCameras cameras = test_cameras();
+  const CalibrationMessage message(cameras, "left_frame", 5);
+  EXPECT_STREQ(message.message().header.frame_id, "left_frame");
+  const auto back = from_message(message.message());
+  ASSERT_TRUE(back.ok()) << back.error();
+  EXPECT_EQ(back->rig.name, "cam");
+  for (const auto& [a, b] : {std::pair(&cameras.rig.left, &back->rig.left),
+                             std::pair(&cameras.rig.right, &back->rig.right)}) {
+    EXPECT_EQ(a->width, b->width);
+    EXPECT_EQ(a->height, b->height);
+    EXPECT_EQ(a->fx, b->fx);
+    EXPECT_EQ(a->fy, b->fy);
+    EXPECT_EQ(a->cx, b->cx);
+    EXPECT_EQ(a->cy, b->cy);
+    EXPECT_EQ(a->distortion, b->distortion);
+    EXPECT_EQ(a->d, b->d);
+    EXPECT_EQ(a->num_coefficients, b->num_coefficients);
+  }
+  EXPECT_TRUE(back->rig.T_right_left.matrix().isApprox(cameras.rig.T_right_left.matrix(), 1e-12));
+  EXPECT_TRUE(back->rig.T_base_left.matrix().isApprox(cameras.rig.T_base_left.matrix(), 1e-12));
+  EXPECT_EQ(back->left_photometric.inverse_response, cameras.left_photometric.inverse_response);
+  ASSERT_EQ(back->left_photometric.vignette.size(), cameras.left_photometric.vignette.size());
+  EXPECT_NEAR(back->left_photometric.vignette.at(700, 400),
+              cameras.left_photometric.vignette.at(700, 400), 1e-5);
+  EXPECT_TRUE(back->right_photometric.empty());
+}
+
+TEST(CalibrationConversion, MalformedMessagesAreRefusedByField) {
+  using M = msg::StereoCalibration;
+  const std::vector<std::pair<std::string, std::function<void(M&)>>> cases = {
+      {"left: size", [](M& m) { m.left.width = 0; }},
+      {"right: size", [](M& m) { m.right.height = 0xFFFFFFFF; }},
+      {"left.model", [](M& m) { m.left.model = borrow("omni"); }},
+      {"left.fx_fy_cx_cy", [](M& m) { m.left.fx_fy_cx_cy[0] = -1.0; }},
+      {"right.fx_fy_cx_cy", [](M& m) { m.right.fx_fy_cx_cy[2] = NAN; }},
+      {"left.distortion_model", [](M& m) { m.left.distortion_model = nullptr; }},
+      {"left.d", [](M& m) { m.left.d._length = 3; }},
+      {"right.d", [](M& m) { m.right.d._buffer[0] = INFINITY; }},
+      {"left.response", [](M& m) { m.left.response._length = 255; }},
+      {"left.vignette", [](M& m) { m.left.vignette._length -= 1; }},
+      {"right_from_left",
+       [](M& m) {
+         m.right_from_left.rotation = {0, 0, 0, 0};
+       }},
+      {"base_from_left", [](M& m) { m.base_from_left.translation.x = NAN; }},
+      {"metres", [](M& m) { m.right_from_left.translation.x = -110.0; }},
+      {"right_from_left",
+       [](M& m) {
+         m.right_from_left.translation = {0, 0, 0};
+       }},
+  };
+  for (const auto& [field, spoil] : cases) {
+    const CalibrationMessage original(test_cameras(), "left", 0);
+    M message = original.message();
+    ASSERT_TRUE(from_message(message).ok());
+    spoil(message);
+    const auto result = from_message(message);
+    ASSERT_FALSE(result.ok()) << field;
+    EXPECT_NE(result.error().find(field), std::string::npos) << result.error();
+  }
+}
+
+}  // namespace
+}  // namespace sovo::bridge

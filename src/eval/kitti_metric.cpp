@@ -6,10 +6,25 @@
 namespace sovo {
 namespace {
 
+/// Distances in single precision, as the devkit sums them: at a borderline it decides which frame a
+/// piece ends at.
+std::vector<float> devkit_distances(std::span<const SE3> poses) {
+  std::vector<float> distances(poses.size(), 0.0F);
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    const Vec3 difference = poses[i - 1].translation() - poses[i].translation();
+    const Eigen::Vector3f step = difference.cast<float>();
+    const float squared = step.x() * step.x() + step.y() * step.y() + step.z() * step.z();
+    const double length = std::sqrt(static_cast<double>(squared));
+    distances[i] = static_cast<float>(static_cast<double>(distances[i - 1]) + length);
+  }
+  return distances;
+}
+
 /// The first frame farther than `length` beyond `first`, or -1.
-int last_frame_of(std::span<const double> distances, int first, double length) {
+int last_frame_of(std::span<const float> distances, int first, double length) {
   const auto begin = distances.begin() + first;
-  const auto it = std::upper_bound(begin, distances.end(), distances[first] + length);
+  const float end = distances[first] + static_cast<float>(length);
+  const auto it = std::upper_bound(begin, distances.end(), end);
   return it == distances.end() ? -1 : static_cast<int>(it - distances.begin());
 }
 
@@ -21,13 +36,11 @@ SegmentError segment_error(std::span<const SE3> truth, std::span<const SE3> esti
   SegmentError out{first, last, length};
   out.translation = error.translation().norm() / length;
   out.rotation = error.rotation().log().norm() / length;
-  const double squared = motion.translation().squaredNorm();
-  if (squared > 0.0) {
-    // The rotation of E leaves lengths alone: |trans E| = |t_true - t_estimate|.
-    out.best_scale = motion.translation().dot(true_motion.translation()) / squared;
-  }
-  const Vec3 rest = true_motion.translation() - out.best_scale * motion.translation();
-  out.translation_best = rest.norm() / length;
+  const Vec3 moved = motion.translation();
+  const Vec3 true_moved = true_motion.translation();
+  // The rotation of E leaves lengths alone: |trans E| = |t_true - t_estimate|.
+  if (moved.squaredNorm() > 0.0) out.best_scale = moved.dot(true_moved) / moved.squaredNorm();
+  out.translation_best = (true_moved - out.best_scale * moved).norm() / length;
   return out;
 }
 
@@ -46,7 +59,7 @@ std::vector<double> travelled_distances(std::span<const SE3> poses) {
 
 std::vector<SegmentError> kitti_segments(std::span<const SE3> truth, std::span<const SE3> estimate,
                                          std::span<const double> lengths, int step) {
-  const std::vector<double> distances = travelled_distances(truth);
+  const std::vector<float> distances = devkit_distances(truth);
   const int count = static_cast<int>(std::min(truth.size(), estimate.size()));
   std::vector<SegmentError> segments;
   for (int first = 0; first < count; first += std::max(1, step)) {

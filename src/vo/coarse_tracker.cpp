@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "sovo/image/interpolation.h"
 
@@ -291,13 +292,45 @@ TrackingResult CoarseTracker::track(const TrackingReference& reference, const Im
         try_hypothesis(reference, pyramid, exposure_s, affine_guess, hypotheses[i], &best_rmse);
     tried.hypothesis = static_cast<int>(i);
     if (tried.good && (!best.good || tried.rmse < best.rmse)) best = tried;
-    const bool enough = last_rmse <= 0.0 || best.rmse < config_.lost_rmse_factor * last_rmse;
+    const bool enough = last_rmse > 0.0 && best.rmse < config_.lost_rmse_factor * last_rmse;
     if (best.good && enough && best.inlier_ratio > config_.min_inlier_ratio) break;
   }
   if (!best.good) return best;
   best.good = best.rmse < config_.max_rmse && best.inlier_ratio > config_.min_inlier_ratio;
   measure_flow(reference, best.T_current_reference, &best.flow_translation, &best.flow_total);
   return best;
+}
+
+std::vector<SE3> CoarseTracker::rank(const TrackingReference& reference,
+                                     const ImagePyramid& pyramid, double exposure_s,
+                                     const Affine& affine_guess, std::span<const SE3> hypotheses,
+                                     std::size_t keep) {
+  const int coarsest =
+      std::min(static_cast<int>(reference.levels.size()), pyramid.num_levels()) - 1;
+  std::vector<std::pair<double, SE3>> found;
+  for (const SE3& start : hypotheses) {
+    SE3 T = start;
+    double rmse = 0.0;
+    double in_view = 0.0;
+    for (int l = coarsest; l >= std::max(0, coarsest - 1); --l) {
+      double cutoff = config_.cutoff;
+      Affine affine = affine_guess;
+      const LevelOutcome o =
+          align_level(reference, l, pyramid.level(l), exposure_s, &cutoff, &T, &affine);
+      rmse = o.finite ? o.rmse : 1e10;
+      in_view = static_cast<double>(o.last.inliers) /
+                static_cast<double>(reference.levels[static_cast<std::size_t>(l)].size());
+    }
+    // A motion that moves the points out of view explains nothing.
+    if (in_view > 0.0) found.emplace_back(rmse / std::sqrt(in_view), T);
+  }
+  std::stable_sort(found.begin(), found.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<SE3> out;
+  for (const auto& [score, T] : found) {
+    if (out.size() < keep) out.push_back(T);
+  }
+  return out;
 }
 
 void measure_flow(const TrackingReference& reference, const SE3& T, double* translation,

@@ -31,10 +31,16 @@ class CoarseTracker {
   explicit CoarseTracker(const TrackerConfig& config) : config_(config) {}
 
   /// Tracks from the first hypothesis on until one is as good as `last_rmse` lets expect; the best
-  /// one counts. `last_rmse` <= 0: nothing is known of it.
+  /// one counts. `last_rmse` <= 0: nothing is known of it, all are tried.
   TrackingResult track(const TrackingReference& reference, const ImagePyramid& pyramid,
                        double exposure_s, const Affine& affine_guess,
                        std::span<const SE3> hypotheses, double last_rmse);
+
+  /// For when nothing is known of the motion: aligns the coarsest level from each hypothesis, and
+  /// returns the `keep` best motions found, best first.
+  std::vector<SE3> rank(const TrackingReference& reference, const ImagePyramid& pyramid,
+                        double exposure_s, const Affine& affine_guess,
+                        std::span<const SE3> hypotheses, std::size_t keep);
 
   /// One linearization for tests: 8x8 normal matrix, gradient and mean energy at a level.
   struct Linearization {

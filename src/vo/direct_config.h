@@ -4,12 +4,12 @@ namespace sovo {
 
 /// Coarse-to-fine tracking of every frame against the newest keyframe.
 struct TrackerConfig {
-  double huber = 9.0;          ///< Of the photometric residual [grey levels].
-  double cutoff = 20.0;        ///< Residuals above count a constant and leave the normal equations.
+  double huber = 9.0;    ///< Of the photometric residual [grey levels].
+  double cutoff = 20.0;  ///< Residuals above count a constant and leave the normal equations.
   int max_levels = 6;
-  double lost_rmse_factor = 1.5;   ///< A hypothesis this much better than the last frame is taken.
-  double max_rmse = 40.0;          ///< Lost above [grey levels].
-  double min_inlier_ratio = 0.3;   ///< Lost below: reference pixels in view that agree.
+  double lost_rmse_factor = 1.5;  ///< A hypothesis this much better than the last frame is taken.
+  double max_rmse = 40.0;         ///< Lost above [grey levels].
+  double min_inlier_ratio = 0.3;  ///< Lost below: reference pixels in view that agree.
   double brightness_prior_a = 100.0;  ///< Weight of a prior on the log-gain to the reference.
   double brightness_prior_b = 0.0;    ///< The same for the bias.
 
@@ -33,8 +33,8 @@ struct KeyframeConfig {
   double flow_total = 0.02;
   double brightness = 2.0;
   double rmse_factor = 2.0;
-  int max_keyframes = 7;   ///< In the window, the newest included.
-  int min_keyframes = 5;   ///< Kept although few of their points remain.
+  int max_keyframes = 7;          ///< In the window, the newest included.
+  int min_keyframes = 5;          ///< Kept although few of their points remain.
   double min_points_left = 0.05;  ///< A keyframe with a smaller share of its points leaves.
   double max_brightness = 0.7;    ///< |log-gain| to the newest keyframe above which one leaves.
 
@@ -84,11 +84,11 @@ struct WindowConfig {
   double huber = 9.0;
   double outlier_threshold = 144.0;  ///< A pixel: start value of the adaptive outlier threshold.
   double gradient_constant = 50.0;   ///< c of the weight c^2 / (c^2 + |grad I|^2).
-  double folding_weight = 0.25;      ///< Of marginalized points' Hessians: pattern pixels correlate.
+  double folding_weight = 0.25;  ///< Of marginalized points' Hessians: pattern pixels correlate.
   double damping = 1e-5;
-  double stop_threshold = 1.2;       ///< Times the step norms below which iteration stops.
-  double prior_a = 1e4;              ///< Weight of the prior on each frame's log-gain.
-  double prior_b = 1.0;              ///< The same for the bias.
+  double stop_threshold = 1.2;             ///< Times the step norms below which iteration stops.
+  double prior_a = 1e4;                    ///< Weight of the prior on each frame's log-gain.
+  double prior_b = 1.0;                    ///< The same for the bias.
   double min_relative_information = 50.0;  ///< H_rho * mean_rho^2 of a point to be marginalized.
   int min_good_residuals = 3;
 

@@ -134,7 +134,7 @@ class DirectOdometry {
   TrackedFrame track_hypotheses(const MonoFrame& frame,
                                 std::shared_ptr<const TrackingReference> reference,
                                 const std::vector<SE3>& hypotheses);
-  std::vector<SE3> motion_hypotheses(const TrackingReference& reference) const;
+  std::vector<SE3> motion_hypotheses(const TrackingReference& reference, const MonoFrame& frame);
 
   DirectConfig config_;
   CameraModel camera_;

@@ -22,11 +22,32 @@ void add_rotations(const SE3& around, std::vector<SE3>* hypotheses) {
   }
 }
 
+/// Motions to try when none is known: translations along each axis in shares of the mean depth,
+/// and rotations.
+std::vector<SE3> unknown_motions(const SE3& around, double mean_rho) {
+  constexpr std::array<double, 5> kShares = {0.02, 0.04, 0.07, 0.11, 0.16};
+  std::vector<SE3> out = {around};
+  for (const double share : kShares) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const double sign : {-1.0, 1.0}) {
+        Vec3 t = Vec3::Zero();
+        t[axis] = sign * share / mean_rho;
+        out.push_back(SE3(SO3(), t) * around);
+      }
+    }
+  }
+  add_rotations(around, &out);
+  return out;
+}
+
+constexpr std::size_t kUnknownMotionsKept = 4;
+
 SE3 scaled_motion(const SE3& motion, double factor) { return SE3::exp(factor * motion.log()); }
 
 }  // namespace
 
-std::vector<SE3> DirectOdometry::motion_hypotheses(const TrackingReference& reference) const {
+std::vector<SE3> DirectOdometry::motion_hypotheses(const TrackingReference& reference,
+                                                   const MonoFrame& frame) {
   const SE3 T_reference_world = reference.T_world_camera.inverse();
   // Past frames relative to the reference, in its scale.
   std::vector<SE3> from_reference;
@@ -42,16 +63,10 @@ std::vector<SE3> DirectOdometry::motion_hypotheses(const TrackingReference& refe
       from_reference.push_back(T * (T_reference_world * T_world_keyframe).inverse());
     }
   }
-  if (from_reference.empty()) {
-    std::vector<SE3> out = {SE3()};
-    add_rotations(SE3(), &out);
-    return out;
-  }
-  const SE3& last = from_reference.back();
-  if (from_reference.size() < 2 || past_.size() < 2) {
-    std::vector<SE3> out = {last, SE3()};
-    add_rotations(last, &out);
-    return out;
+  const SE3 last = from_reference.empty() ? SE3() : from_reference.back();
+  if (from_reference.size() < 2) {
+    return tracker_.rank(reference, *frame.pyramid, frame.exposure_s, last_affine_,
+                         unknown_motions(last, reference.mean_rho), kUnknownMotionsKept);
   }
   // Constant velocity over the true time between the frames, which may have been dropped.
   const SE3 motion = last * from_reference[0].inverse();
@@ -69,7 +84,7 @@ TrackedFrame DirectOdometry::track(const MonoFrame& frame) {
     expected_steps_ = static_cast<double>(frame.stamp_ns - past_[1].stamp_ns) / before;
   }
   auto ref = reference();
-  const std::vector<SE3> hypotheses = motion_hypotheses(*ref);
+  const std::vector<SE3> hypotheses = motion_hypotheses(*ref, frame);
   return track_hypotheses(frame, std::move(ref), hypotheses);
 }
 

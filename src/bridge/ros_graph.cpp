@@ -62,9 +62,11 @@ void copy_name(char (&target)[257], const std::string& name) {
   target[length] = '\0';
 }
 
-/// Both layouts carry the same type name; Humble's has no type information that could contradict
-/// Iron's.
-dds_topic_descriptor_t descriptor_of(RosGraph layout) {
+}  // namespace
+
+// Both layouts carry the same type name; Humble's has no type information that could contradict
+// Iron's.
+dds_topic_descriptor_t graph_descriptor(RosGraph layout) {
   const dds_topic_descriptor_t& iron = rmw_dds_common_msg_dds__ParticipantEntitiesInfo__desc;
   if (layout != RosGraph::kHumble) return iron;
   const dds_topic_descriptor_t& humble =
@@ -75,13 +77,11 @@ dds_topic_descriptor_t descriptor_of(RosGraph layout) {
           {nullptr, 0},   {nullptr, 0},    0};
 }
 
-}  // namespace
-
 Result<std::unique_ptr<RosGraphWriter>> RosGraphWriter::open(dds_entity_t participant,
                                                              RosGraph layout,
                                                              const std::string& node_namespace,
                                                              const std::string& node) {
-  const dds_topic_descriptor_t descriptor = descriptor_of(layout);
+  const dds_topic_descriptor_t descriptor = graph_descriptor(layout);
   auto topic = take_entity(
       dds_create_topic(participant, &descriptor, "ros_discovery_info", nullptr, nullptr),
       "cannot create topic ros_discovery_info");

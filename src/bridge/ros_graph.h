@@ -9,6 +9,9 @@
 
 namespace sovo::bridge {
 
+/// Descriptor of the graph message in the layout of a ROS 2 release.
+dds_topic_descriptor_t graph_descriptor(RosGraph layout);
+
 /// Writes `ros_discovery_info`: which node owns which readers and writers, so that `ros2 node list`
 /// and `ros2 topic info -v` name this process.
 class RosGraphWriter {

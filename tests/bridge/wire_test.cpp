@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "sovo/bridge/camera_publisher.h"
+#include "sovo/bridge/ros_graph.h"
 #include "sovo/bridge/ros_names.h"
 #include "sovo/bridge/topics.h"
 #include "sovo/bridge/vo_publisher.h"
@@ -189,10 +190,12 @@ void expect_graph(RosGraph layout, std::size_t gid_size) {
             "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_");
   EXPECT_TRUE(discovery.writer("ros_discovery_info").latched);
 
-  DdsHandle topic(dds_find_topic(DDS_FIND_SCOPE_PARTICIPANT, participant.entity(),
-                                 "ros_discovery_info", nullptr, 0));
+  const Participant other = open_remote_participant();
+  const dds_topic_descriptor_t descriptor = graph_descriptor(layout);
+  DdsHandle topic(
+      dds_create_topic(other.entity(), &descriptor, "ros_discovery_info", nullptr, nullptr));
   const QosPtr qos = reader_qos(latched(1), "");
-  DdsHandle reader(dds_create_reader(participant.entity(), topic.get(), qos.get(), nullptr));
+  DdsHandle reader(dds_create_reader(other.entity(), topic.get(), qos.get(), nullptr));
   ASSERT_GT(reader.get(), 0);
   void* sample = nullptr;
   dds_sample_info_t sample_info{};

@@ -33,7 +33,7 @@ struct CameraSection {
   std::string path;         ///< Dataset folder.
   std::string calibration;  ///< Empty: the one that belongs to the dataset.
   std::string rate = "auto";
-  std::string name = "cam";
+  std::string name;
   bool reverse = false;
   bool restamp = false;
   int start = 0;
@@ -45,7 +45,7 @@ struct CameraSection {
     v("path", path, "dataset: KITTI odometry, EuRoC, TUM-VI, or folders left/ and right/");
     v("calibration", calibration, "calibration file; empty: the one of the dataset or of the bus");
     v("rate", rate, "1.0: real time, max: as fast as can be, auto: 1.0 on the bus, else max");
-    v("name", name, "prefix of the camera's frame names");
+    v("name", name, "prefix of the camera's frames; empty: as calibrated, else cam");
     v("reverse", reverse, "feed the frames backwards, with mirrored stamps");
     v("restamp", restamp, "shift the stamps so that the first frame is now");
     v("start", start, "frames left out at the beginning");

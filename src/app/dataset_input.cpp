@@ -27,7 +27,7 @@ Result<std::unique_ptr<DatasetSource>> open_dataset_input(const CameraSection& c
   options.rate = *rate;
   options.restamp = camera.restamp;
   options.frame_rate = camera.frame_rate;
-  options.frame_id = camera.name + "_left_camera_optical_frame";
+  options.frame_id.clear();  // the publisher names it
   auto source = open_dataset(options);
   if (!source) return source;
   for (const std::string& note : (*source)->notes()) spdlog::info("{}", note);

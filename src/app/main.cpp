@@ -33,6 +33,13 @@ int run(int argc, char** argv) {
   set_up_logging("info");
 
   int exit_code = kOk;
+  add_run_command(app, &exit_code);
+  add_camera_command(app, &exit_code);
+  add_vo_command(app, &exit_code);
+  add_status_command(app, &exit_code);
+  add_command_command(app, &exit_code);
+  add_eval_command(app, &exit_code);
+  add_calib_command(app, &exit_code);
   add_config_command(app, &exit_code);
   try {
     app.parse(argc, argv);

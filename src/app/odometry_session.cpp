@@ -9,24 +9,29 @@
 namespace sovo::app {
 namespace {
 
-std::vector<OutputSink*> sinks(OutputSink* recorder, OutputSink* publisher) {
-  if (publisher == nullptr) return {recorder};
-  return {recorder, publisher};
+template <class T>
+std::vector<T*> with(T* own, std::vector<T*> others) {
+  others.insert(others.begin(), own);
+  return others;
 }
 
 }  // namespace
 
 OdometrySession::OdometrySession(const AppConfig& config, const StereoCameras& cameras,
-                                 ProfileCollector* profile, OutputSink* publisher)
+                                 std::vector<OutputSink*> sinks,
+                                 std::vector<StageObserver*> observers)
     : config_(config),
-      profile_(profile),
+      cameras_(cameras),
       recorder_({!config.output.live_trajectory.empty(), !config.output.keyframes.empty()}),
-      sink_(sinks(&recorder_, publisher)),
-      odometry_(std::make_unique<StereoOdometry>(config.odometry, cameras, &sink_, profile)) {}
+      sink_(with<OutputSink>(&recorder_, std::move(sinks))),
+      observer_(with<StageObserver>(&profile_, std::move(observers))),
+      odometry_(std::make_unique<StereoOdometry>(config.odometry, cameras, &sink_, &observer_)) {}
 
-void OdometrySession::wait_for_mapping() {
-  const auto limit = static_cast<std::uint32_t>(config_.odometry.mapping_queue);
-  if (recorder_.counts().queue_depth + 1 >= limit) odometry_->finish();
+void OdometrySession::restart() {
+  odometry_->finish();
+  odometry_.reset();
+  recorder_.clear();
+  odometry_ = std::make_unique<StereoOdometry>(config_.odometry, cameras_, &sink_, &observer_);
 }
 
 int OdometrySession::finish(const StampMap& original_stamp) {
@@ -34,11 +39,11 @@ int OdometrySession::finish(const StampMap& original_stamp) {
   RunResults results;
   results.refined = odometry_->refined_trajectory();
   results.recorder = &recorder_;
-  results.profile = profile_;
+  results.profile = &profile_;
   results.context.threads = config_.odometry.threads;
   results.original_stamp = original_stamp;
   const RunCounts counts = recorder_.counts();
-  std::cout << run_summary(*profile_, counts) << "\n" << timing_table(*profile_) << std::flush;
+  std::cout << run_summary(profile_, counts) << "\n" << timing_table(profile_) << std::flush;
   if (auto written = write_outputs(config_.output, results); !written) {
     spdlog::error("{}", written.error());
     return kFailed;

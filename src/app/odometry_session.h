@@ -31,19 +31,36 @@ class TeeSink : public OutputSink {
   std::vector<OutputSink*> sinks_;
 };
 
+/// Gives every time to several observers.
+class TeeObserver : public StageObserver {
+ public:
+  explicit TeeObserver(std::vector<StageObserver*> observers) : observers_(std::move(observers)) {}
+
+  void on_stage(Stage stage, double seconds) override {
+    for (StageObserver* observer : observers_) observer->on_stage(stage, seconds);
+  }
+  void on_window(std::uint32_t points, std::uint32_t residuals) override {
+    for (StageObserver* observer : observers_) observer->on_window(points, residuals);
+  }
+
+ private:
+  std::vector<StageObserver*> observers_;
+};
+
 /// An odometry with all that is recorded about it, from the first frame to the files at the end.
 class OdometrySession {
  public:
-  /// `publisher` gets the outputs too; may be null, must outlive the session. `profile` likewise,
-  /// never null.
-  OdometrySession(const AppConfig& config, const StereoCameras& cameras, ProfileCollector* profile,
-                  OutputSink* publisher = nullptr);
+  /// `sinks` and `observers` get outputs and times too; they must outlive the session.
+  OdometrySession(const AppConfig& config, const StereoCameras& cameras,
+                  std::vector<OutputSink*> sinks = {}, std::vector<StageObserver*> observers = {});
 
   /// Live, frames that come faster than mapping goes are dropped and counted.
   void process(const StereoFrame& frame) { odometry_->process(frame); }
-  /// Waits for mapping when its queue is nearly full, so that it drops nothing.
-  void wait_for_mapping();
+  /// Begins a new segment with the next frame.
   void reset() { odometry_->reset(); }
+  /// Begins anew with a source whose stamps have nothing to do with those before; what was
+  /// recorded is forgotten.
+  void restart();
   RunCounts counts() const { return recorder_.counts(); }
 
   /// Finishes the work, writes the files and prints the summary to stdout. Returns an exit code:
@@ -52,9 +69,11 @@ class OdometrySession {
 
  private:
   AppConfig config_;
-  ProfileCollector* profile_;
+  StereoCameras cameras_;
+  ProfileCollector profile_;
   RunRecorder recorder_;
   TeeSink sink_;
+  TeeObserver observer_;
   std::unique_ptr<StereoOdometry> odometry_;
 };
 

@@ -15,15 +15,13 @@ namespace sovo::app {
 namespace {
 
 /// Feeds every frame until the source ends or the user stops; false when the source broke.
-/// `wait`: the source waits for the odometry, nothing is dropped.
-bool feed(DatasetSource& source, bool wait, OdometrySession& session, StopSignal& stop) {
+bool feed(DatasetSource& source, OdometrySession& session, StopSignal& stop) {
   Progress progress(source.size());
   while (!stop.requested()) {
     const SourceResult next = source.next(std::chrono::milliseconds(100));
     switch (next.state) {
       case SourceState::kFrame: {
         session.process(next.frame);
-        if (wait) session.wait_for_mapping();
         const RunCounts counts = session.counts();
         progress.update(counts.fed, counts.state);
         break;
@@ -44,7 +42,7 @@ bool feed(DatasetSource& source, bool wait, OdometrySession& session, StopSignal
   return true;
 }
 
-int run(const AppConfig& config) {
+int run(AppConfig config) {
   if (config.camera.path.empty()) return fail(kUsage, "no dataset given; use --dataset FOLDER");
   if (auto writable = check_outputs(config.output); !writable) {
     return fail(kUsage, writable.error());
@@ -53,10 +51,10 @@ int run(const AppConfig& config) {
   auto source = open_dataset_input(config.camera, 0.0);
   if (!source) return fail(kBadInput, source.error());
   DatasetSource& dataset = **source;
-  const bool wait = *parse_rate(config.camera.rate, 0.0) == 0.0;
-  ProfileCollector profile;
-  OdometrySession session(config, to_cameras(dataset.calibration()), &profile);
-  const bool source_ok = feed(dataset, wait, session, stop);
+  // As fast as can be means that the source waits for the odometry and nothing is dropped.
+  if (*parse_rate(config.camera.rate, 0.0) == 0.0) config.odometry.wait_for_mapping = true;
+  OdometrySession session(config, to_cameras(dataset.calibration()));
+  const bool source_ok = feed(dataset, session, stop);
   const int code =
       session.finish([&dataset](std::int64_t fed) { return dataset.original_stamp(fed); });
   return source_ok ? code : kBadInput;

@@ -12,7 +12,6 @@ void RunRecorder::on_frame(const OdometryOutput& output) {
   counts_.lost_segments = output.segment - first_segment_;
   counts_.rejected = output.rejected;
   counts_.dropped = output.dropped_queue;
-  counts_.queue_depth = output.queue_depth;
   counts_.state = to_string(output.state);
   if (output.pose_valid && keep_.live_poses) {
     live_.push_back({output.stamp_ns, output.T_odom_left});
@@ -34,6 +33,15 @@ void RunRecorder::on_scale(const ScaleRecord& record) {
   const std::lock_guard lock(mutex_);
   ++counts_.verdicts[to_string(record.verdict)];
   if (keep_.scale_records) scales_.push_back(record);
+}
+
+void RunRecorder::clear() {
+  const std::lock_guard lock(mutex_);
+  counts_ = {};
+  newest_keyframe_ = 0;
+  last_reason_.clear();
+  live_.clear();
+  scales_.clear();
 }
 
 RunCounts RunRecorder::counts() const {

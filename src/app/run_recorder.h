@@ -41,6 +41,9 @@ class RunRecorder : public OutputSink {
   void on_keyframe(const KeyframeOutput& keyframe) override;
   void on_scale(const ScaleRecord& record) override;
 
+  /// Forgets everything.
+  void clear();
+
   RunCounts counts() const;
   std::vector<TrajectoryPose> live_poses() const;
   std::vector<ScaleRecord> scale_records() const;

@@ -1,0 +1,237 @@
+#include <chrono>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "sovo/app/commands.h"
+#include "sovo/app/config_options.h"
+#include "sovo/app/dataset_input.h"
+#include "sovo/app/failure.h"
+#include "sovo/app/odometry_session.h"
+#include "sovo/app/stop_signal.h"
+#include "sovo/bridge/command_subscriber.h"
+#include "sovo/bridge/stereo_subscriber.h"
+#include "sovo/bridge/vo_publisher.h"
+#include "sovo/io/calibration.h"
+
+namespace sovo::app {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+/// The odometry process: frames and commands from the bus in, odometry out.
+class VoProcess {
+ public:
+  VoProcess(const AppConfig& config, bridge::StereoSubscriber& source,
+            bridge::CommandSubscriber& commands, bridge::VoPublisher& publisher)
+      : config_(config),
+        source_(source),
+        commands_(commands),
+        publisher_(publisher),
+        session_(config, source.cameras(), {&publisher}, {publisher.timings()}) {}
+
+  /// Works until the user stops it, the source has gone or enough frames were taken; returns an
+  /// exit code.
+  int run(StopSignal& stop) {
+    bool source_ok = true;
+    while (source_ok && !stop.requested() && !is_done()) {
+      obey_commands();
+      SourceResult next = source_.next(std::chrono::milliseconds(50));
+      switch (next.state) {
+        case SourceState::kFrame:
+          take(next.frame);
+          break;
+        case SourceState::kTimeout:
+          break;
+        case SourceState::kBadFrame:
+          spdlog::warn("{}", next.message);
+          break;
+        case SourceState::kFailed:
+        case SourceState::kEndOfStream:
+          spdlog::error("{}", next.message);
+          source_ok = false;
+          break;
+      }
+    }
+    const int code = session_.finish();
+    report_losses();
+    return source_ok ? code : kFailed;
+  }
+
+ private:
+  bool is_done() const {
+    if (config_.camera.frames > 0 && taken_ >= config_.camera.frames) return true;
+    const std::chrono::duration<double> idle(config_.node.idle_exit_s);
+    return taken_ > 0 && idle.count() > 0.0 && Clock::now() - last_frame_ > idle;
+  }
+
+  void take(const StereoFrame& frame) {
+    last_frame_ = Clock::now();
+    ++taken_;
+    follow_session(frame);
+    publisher_.set_feed(feed());
+    if (paused_) {
+      publisher_.on_frame(paused_output(frame));
+    } else {
+      session_.process(frame);
+    }
+    if (publisher_.failed_writes() > reported_failures_) {
+      reported_failures_ = publisher_.failed_writes();
+      spdlog::warn("not published: {}", publisher_.last_failure());
+    }
+  }
+
+  /// Another session is another run of the camera: nothing connects it with the map.
+  void follow_session(const StereoFrame& frame) {
+    if (last_ && last_->session != frame.session) {
+      const bool goes_back = frame.stamp_ns <= last_->stamp_ns;
+      spdlog::info(
+          "a new source, session {:x}: {}", frame.session,
+          goes_back ? "its stamps are older, the odometry begins anew" : "a new segment begins");
+      goes_back ? session_.restart() : session_.reset();
+    }
+    last_ = LastFrame{frame.session, frame.stamp_ns};
+  }
+
+  bridge::FeedStatus feed() const {
+    const bridge::FeedCounters counters = source_.counters();
+    bridge::FeedStatus feed;
+    feed.lost_transport = counters.lost_transport;
+    feed.dropped_queue = counters.dropped_queue;
+    feed.rejected = counters.rejected + counters.foreign;
+    feed.last_command_id = commands_.last_id();
+    feed.last_command_result = commands_.last_result();
+    feed.latency_origin_ns = source_.latency_origin_ns();
+    return feed;
+  }
+
+  OdometryOutput paused_output(const StereoFrame& frame) const {
+    OdometryOutput output;
+    output.stamp_ns = frame.stamp_ns;
+    output.session = frame.session;
+    output.sequence = frame.sequence;
+    output.state = OdometryState::kStopped;
+    output.reason = "paused; sovo command resume goes on";
+    output.received = source_.counters().received;
+    return output;
+  }
+
+  void obey_commands() {
+    for (const bridge::Command& command : commands_.poll()) {
+      const std::string result = obey(command);
+      spdlog::info("command {:x}: {}", command.id, result);
+      commands_.answer(command, result);
+    }
+  }
+
+  std::string obey(const bridge::Command& command) {
+    switch (command.kind) {
+      case bridge::CommandKind::kReset:
+        if (command.T_odom_base) {
+          return "refused: a reset goes on from the last pose; leave the command's pose at zeros";
+        }
+        session_.reset();
+        return "done: a new segment begins";
+      case bridge::CommandKind::kPause:
+        paused_ = true;
+        return "done: paused";
+      case bridge::CommandKind::kResume:
+        paused_ = false;
+        return "done: resumed";
+    }
+    return "refused: unknown command";
+  }
+
+  void report_losses() const {
+    const bridge::FeedCounters counters = source_.counters();
+    spdlog::info("received {} frames; lost in transport {}, dropped {}, malformed {}, foreign {}",
+                 counters.received, counters.lost_transport, counters.dropped_queue,
+                 counters.rejected, counters.foreign);
+  }
+
+  struct LastFrame {
+    std::uint64_t session = 0;
+    std::int64_t stamp_ns = 0;
+  };
+
+  const AppConfig& config_;
+  bridge::StereoSubscriber& source_;
+  bridge::CommandSubscriber& commands_;
+  bridge::VoPublisher& publisher_;
+  OdometrySession session_;
+  bool paused_ = false;
+  int taken_ = 0;
+  std::optional<LastFrame> last_;
+  Clock::time_point last_frame_;
+  std::uint64_t reported_failures_ = 0;
+};
+
+Result<std::optional<StereoCameras>> read_calibration(const std::string& path) {
+  if (path.empty()) return std::optional<StereoCameras>();
+  const auto calibration = load_calibration(path);
+  if (!calibration) return calibration.failure();
+  return std::optional(to_cameras(*calibration));
+}
+
+/// Waits until the source's calibration has come; says now and then what is missing. False when
+/// the user stops.
+bool wait_for_calibration(bridge::StereoSubscriber& source, StopSignal& stop) {
+  std::string told;
+  auto last_told = Clock::now() - std::chrono::seconds(10);
+  while (!stop.requested()) {
+    const auto found = source.wait_for_calibration(std::chrono::milliseconds(100));
+    if (found) return true;
+    if (found.error() == told && Clock::now() - last_told < std::chrono::seconds(10)) continue;
+    told = found.error();
+    last_told = Clock::now();
+    spdlog::warn("waiting: {}", told);
+  }
+  return false;
+}
+
+int run(const AppConfig& config) {
+  if (auto writable = check_outputs(config.output); !writable) {
+    return fail(kUsage, writable.error());
+  }
+  auto calibration = read_calibration(config.camera.calibration);
+  if (!calibration) return fail(kBadInput, calibration.error());
+  StopSignal stop;  // before the threads of bus and odometry
+  auto participant = bridge::Participant::open(config.dds, "vo");
+  if (!participant) return fail(kFailed, participant.error());
+  for (const std::string& note : participant->notes()) spdlog::info("{}", note);
+
+  auto source = bridge::StereoSubscriber::open(*participant, {}, std::move(*calibration));
+  if (!source) return fail(kFailed, source.error());
+  auto commands = bridge::CommandSubscriber::open(*participant);
+  if (!commands) return fail(kFailed, commands.error());
+  if (!wait_for_calibration(**source, stop)) {
+    return fail(kFailed, "stopped before a calibration came; no frame was tracked");
+  }
+  bridge::VoPublisherConfig publishing;
+  publishing.publish_tf = config.node.publish_tf;
+  publishing.publish_odom = config.odometry.mode != OdometryMode::kMono;
+  auto publisher =
+      bridge::VoPublisher::open(*participant, publishing, (*source)->rig().T_base_left);
+  if (!publisher) return fail(kFailed, publisher.error());
+  spdlog::info("tracking frames of {}", participant->topic("stereo"));
+  return VoProcess(config, **source, *commands, **publisher).run(stop);
+}
+
+}  // namespace
+
+void add_vo_command(CLI::App& app, int* exit_code) {
+  CLI::App* command = app.add_subcommand("vo", "The odometry process: stereo in, odometry out");
+  auto options = std::make_shared<ConfigOptions>(command);
+  options
+      ->value("--calib", "camera.calibration", "Calibration file, instead of the camera's", "FILE")
+      .value("--frames", "camera.frames", "End after so many frames", "N")
+      .value("--idle-exit", "node.idle_exit_s", "End when no frame came this long", "SECONDS");
+  add_odometry_options(*options);
+  add_dds_options(*options);
+  command->callback([options, exit_code] {
+    const auto config = options->load();
+    *exit_code = config ? run(*config) : fail(kUsage, config.error());
+  });
+}
+
+}  // namespace sovo::app

@@ -123,7 +123,9 @@ TEST(StereoFrameConversion, MalformedMessagesAreRefusedByField) {
       {"left: data", [](M& m) { m.left.data._length = 0, m.left.data._buffer = nullptr; }},
       {"left: step", [](M& m) { m.left.encoding = borrow("mono16"); }},
       {"left.encoding 'jpeg'", [](M& m) { m.left.encoding = borrow("jpeg"); }},
-      {"left.encoding '?" "?'", [](M& m) { m.left.encoding = borrow("\x1b\n"); }},
+      {"left.encoding '?"
+       "?'",
+       [](M& m) { m.left.encoding = borrow("\x1b\n"); }},
       {"left.encoding ''", [](M& m) { m.left.encoding = nullptr; }},
       {"right: exposure_s", [&](M& m) { m.right.exposure_s = nan; }},
       {"right: exposure_s", [](M& m) { m.right.exposure_s = -1.0F; }},

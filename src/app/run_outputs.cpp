@@ -17,6 +17,14 @@ std::int64_t map_stamp(const StampMap& map, std::int64_t stamp_ns) {
   return map ? map(stamp_ns) : stamp_ns;
 }
 
+/// The same trajectory seen from its first pose: refinement moves that one a little, too.
+std::vector<TrajectoryPose> from_first(std::vector<TrajectoryPose> poses) {
+  if (poses.empty()) return poses;
+  const SE3 T_first_odom = poses.front().T_odom_left.inverse();
+  for (TrajectoryPose& p : poses) p.T_odom_left = T_first_odom * p.T_odom_left;
+  return poses;
+}
+
 Trajectory to_trajectory(const std::vector<TrajectoryPose>& poses, const StampMap& map) {
   Trajectory trajectory;
   trajectory.reserve(poses.size());
@@ -67,7 +75,7 @@ Result<void> check_outputs(const OutputSection& output) {
 Result<void> write_outputs(const OutputSection& output, const RunResults& results) {
   const StampMap& map = results.original_stamp;
   if (!output.trajectory.empty()) {
-    auto done = write_tum(output.trajectory, to_trajectory(results.refined, map));
+    auto done = write_tum(output.trajectory, to_trajectory(from_first(results.refined), map));
     if (!done) return done;
   }
   if (!output.live_trajectory.empty()) {

@@ -1,0 +1,194 @@
+"""`sovo run`: source and odometry in one process."""
+
+import json
+import os
+import pathlib
+import shutil
+import signal
+import time
+import unittest
+
+import harness
+from harness import (BAD_INPUT, DATASET, FAILED, OK, SHARED, CommandTest, largest_error, read_tum,
+                     sovo, start)
+
+FRAMES = 40
+TRUTH = pathlib.Path(DATASET) / "groundtruth_cam0_tum.txt"
+# The rendered camera moves 0.75 m.
+TOLERANCE_M = 0.03
+
+
+class Accuracy(CommandTest):
+    def run_with(self, *options):
+        out = self.folder / "out.txt"
+        self.expect(sovo("run", "--dataset", DATASET, "--rate", "max", "--out", out, *options), OK)
+        return read_tum(out)
+
+    def test_forward(self):
+        poses = self.run_with()
+        self.assertEqual(len(poses), FRAMES)
+        self.assertEqual(poses[0][1:], ([0, 0, 0], [0, 0, 0, 1]))
+        self.assertLess(largest_error(poses, read_tum(TRUTH), poses[0][0]), TOLERANCE_M)
+
+    def test_deterministic(self):
+        poses = self.run_with("--deterministic")
+        self.assertEqual(len(poses), FRAMES)
+        self.assertLess(largest_error(poses, read_tum(TRUTH), poses[0][0]), TOLERANCE_M)
+
+    def test_reverse_writes_the_stamps_of_the_dataset(self):
+        poses = self.run_with("--reverse", "--deterministic")
+        stamps = [stamp for stamp, _, _ in poses]
+        self.assertEqual(stamps, [stamp for stamp, _, _ in read_tum(TRUTH)])
+        # The frame that was fed first is the last of the dataset.
+        self.assertEqual(poses[-1][1:], ([0, 0, 0], [0, 0, 0, 1]))
+        self.assertLess(largest_error(poses, read_tum(TRUTH), stamps[-1]), TOLERANCE_M)
+
+
+class Determinism(CommandTest):
+    def outputs(self, name, *options):
+        files = [self.folder / f"{name}.{kind}" for kind in ("tum", "live", "csv")]
+        self.expect(sovo("run", "--dataset", DATASET, "--deterministic", "--rate", "max",
+                         "--out", files[0], "--out-live", files[1], "--keyframes", files[2],
+                         *options), OK)
+        return [f.read_bytes() for f in files]
+
+    def test_same_bytes_again_and_with_any_number_of_threads(self):
+        first = self.outputs("first", "--threads", 1)
+        self.assertTrue(all(first))
+        self.assertEqual(first, self.outputs("again", "--threads", 1))
+        self.assertEqual(first, self.outputs("two", "--threads", 2))
+        self.assertEqual(first, self.outputs("two_again", "--threads", 2))
+
+
+class Outputs(CommandTest):
+    def test_files_and_summary(self):
+        names = {"--out": "out.txt", "--out-live": "live.txt", "--keyframes": "kf.csv",
+                 "--profile": "profile.json"}
+        files = [str(x) for option, name in names.items() for x in (option, self.folder / name)]
+        result = self.expect(sovo("run", "--dataset", DATASET, "--rate", "max", "--frames", 20,
+                                  "--start", 5, *files), OK)
+        for word in ("frames fed       20", "frames tracked   20 (100.0 %)", "scale verdicts",
+                     "bundle_adjustment"):
+            self.assertIn(word, result.stdout)
+        truth = [stamp for stamp, _, _ in read_tum(TRUTH)]
+        for name in ("out.txt", "live.txt"):
+            stamps = [stamp for stamp, _, _ in read_tum(self.folder / name)]
+            self.assertEqual(stamps, truth[5:25])
+        self.check_keyframes((self.folder / "kf.csv").read_text().splitlines())
+        self.check_profile(json.loads((self.folder / "profile.json").read_text()))
+
+    def check_keyframes(self, lines):
+        self.assertEqual(lines[0], "stamp,correction,sigma,verdict")
+        self.assertGreater(len(lines), 1)
+        for line in lines[1:]:
+            self.assertRegex(line, r"^\d+\.\d{9},[^,]+,[^,]+,\w+$")
+
+    def check_profile(self, profile):
+        names = ["frame", "undistortion", "pyramid", "tracking", "tracing", "selection",
+                 "static_matching", "bundle_adjustment", "marginalization", "scale_optimization"]
+        self.assertEqual(list(profile["stages"]), names)
+        for name in names:
+            self.assertEqual(set(profile["stages"][name]),
+                             {"count", "mean_ms", "median_ms", "p95_ms"})
+        self.assertEqual(profile["stages"]["frame"]["count"], 20)
+        counters = profile["counters"]
+        self.assertEqual(counters["frames"], 20)
+        self.assertGreater(counters["points"], 100)
+        self.assertGreater(counters["residuals"], counters["points"])
+        self.assertEqual(counters["keyframes_per_frame"], counters["keyframes"] / 20)
+        self.assertGreater(profile["peak_memory_mb"], 1)
+        self.assertEqual(profile["threads"], 2)
+        self.assertEqual(profile["kernels"], "scalar")
+
+
+class Interrupt(CommandTest):
+    def test_sigint_ends_cleanly_with_the_trajectory_written(self):
+        out = self.folder / "out.txt"
+        process = start("run", "--dataset", DATASET, "--rate", "0.1", "--out", out)
+        self.wait_for_line(process.stderr, "frames")
+        time.sleep(3)
+        process.send_signal(signal.SIGINT)
+        stdout, stderr = process.communicate(timeout=60)
+        self.assertEqual(process.returncode, OK, stderr)
+        self.assertIn("frames tracked", stdout)
+        self.assertTrue(0 < len(read_tum(out)) < FRAMES)
+
+
+class BadFrames(CommandTest):
+    """Damaged recordings: a report, no crash, and the other frames are tracked."""
+
+    def damaged(self):
+        copy = self.folder / "damaged"
+        shutil.copytree(DATASET, copy)
+        return copy, sorted((copy / "mav0/cam0/data").iterdir())
+
+    def run_on(self, dataset):
+        out = self.folder / "out.txt"
+        result = sovo("run", "--dataset", dataset, "--rate", "max", "--out", out)
+        self.assertIn(result.returncode, (OK, FAILED, BAD_INPUT), result.stderr)
+        return result, read_tum(out) if out.exists() else []
+
+    def test_unreadable_left_image(self):
+        dataset, left = self.damaged()
+        left[20].write_bytes(b"not an image")
+        result, poses = self.run_on(dataset)
+        self.assertEqual(result.returncode, OK)
+        self.assertIn(left[20].name, result.stderr)
+        self.assertGreaterEqual(len(poses), FRAMES - 3)
+
+    def test_missing_right_image(self):
+        dataset, left = self.damaged()
+        (dataset / "mav0/cam1/data" / left[20].name).unlink()
+        result, poses = self.run_on(dataset)
+        self.assertEqual(result.returncode, OK, result.stderr)
+        self.assertGreaterEqual(len(poses), FRAMES - 3)
+
+    def test_image_of_another_size(self):
+        dataset, left = self.damaged()
+        pgm = b"P5 16 16 255\n" + bytes(range(256))
+        left[20].write_bytes(pgm)
+        result, poses = self.run_on(dataset)
+        self.assertEqual(result.returncode, OK, result.stderr)
+        self.assertGreaterEqual(len(poses), FRAMES - 3)
+        self.assertRegex(result.stderr, "16.?x.?16|size")
+
+    def test_image_of_zeros(self):
+        dataset, left = self.damaged()
+        left[20].write_bytes(b"P5 320 240 255\n" + bytes(320 * 240))
+        result, poses = self.run_on(dataset)
+        self.assertEqual(result.returncode, OK, result.stderr)
+        self.assertGreaterEqual(len(poses), FRAMES - 3)
+
+    def test_all_images_black_is_a_failed_job(self):
+        dataset, _ = self.damaged()
+        for image in (dataset / "mav0").glob("cam*/data/*.png"):
+            image.write_bytes(b"P5 320 240 255\n" + bytes(320 * 240))
+        result, poses = self.run_on(dataset)
+        self.assertEqual(result.returncode, FAILED)
+        self.assertEqual(poses, [])
+
+
+class RecordedClips(CommandTest):
+    """Real sequences, where they are at hand."""
+
+    def complete(self, name, *options):
+        dataset = SHARED / "data" / name
+        if not dataset.is_dir():
+            raise unittest.SkipTest(f"SKIPPED: no recording at {dataset} (set SOVO_SHARED)")
+        profile = self.folder / "profile.json"
+        result = self.expect(sovo("run", "--dataset", dataset, "--deterministic", "--rate", "max",
+                                  "--profile", profile, *options), OK)
+        self.assertIn("(100.0 %)", result.stdout)
+        return json.loads(profile.read_text())
+
+    def test_euroc_from_stereo_depth(self):
+        profile = self.complete("euroc/MH_01_head", "--frames", 60, "--init", "stereo")
+        if os.environ.get("SOVO_SANITIZED") != "1":
+            self.assertLess(profile["peak_memory_mb"], 150)
+
+    def test_kitti(self):
+        self.complete("kitti/sequences/06", "--frames", 30)
+
+
+if __name__ == "__main__":
+    harness.main()

@@ -1,0 +1,95 @@
+"""How the command answers to what it is asked: help, configuration, wrong input."""
+
+import harness
+from harness import BAD_INPUT, DATASET, OK, ROOT, USAGE, CommandTest, sovo
+
+COMMANDS = [["run"], ["camera"], ["camera", "dataset"], ["vo"], ["status"], ["command"],
+            ["command", "reset"], ["config"], ["eval"], ["calib"]]
+
+
+class Help(CommandTest):
+    def test_every_command_has_help_with_exit_codes(self):
+        for command in [[]] + COMMANDS:
+            with self.subTest(command=command):
+                result = self.expect(sovo(*command, "--help"), OK)
+                self.assertIn("Usage: ", result.stdout)
+                self.assertIn("Exit codes: 0 ", result.stdout)
+
+    def test_version(self):
+        self.assertRegex(self.expect(sovo("--version"), OK).stdout, r"^sovo \d+\.\d+\.\d+\n$")
+
+    def test_no_command_and_unknown_command_are_wrong_usage(self):
+        self.expect(sovo(), USAGE)
+        self.expect(sovo("fly"), USAGE)
+        self.expect(sovo("run", "--fly"), USAGE)
+
+
+class Configuration(CommandTest):
+    def file(self, text):
+        path = self.folder / "sovo.yaml"
+        path.write_text(text)
+        return path
+
+    def test_unknown_key_is_named_with_its_line(self):
+        path = self.file("mode: scale\nscale:\n  methd: paper\n")
+        result = self.expect(sovo("--config", path, "config"), USAGE)
+        self.assertIn(f"{path}:3:", result.stderr)
+        self.assertIn("methd", result.stderr)
+
+    def test_wrong_values_are_refused(self):
+        for assignment in ["mode=fast", "threads=many", "threads=0", "camera.rate=-1",
+                           "camera.start=-1", "no.such.key=1", "mode"]:
+            with self.subTest(assignment=assignment):
+                self.expect(sovo("--set", assignment, "config"), USAGE)
+
+    def test_dump_reads_back_as_the_same(self):
+        first = self.expect(sovo("config", "--set", "seed=7"), OK).stdout
+        second = self.expect(sovo("config", "--config", self.file(first)), OK).stdout
+        self.assertIn("seed: 7", first)
+        self.assertEqual(first, second)
+
+    def test_command_line_wins_over_file_over_preset(self):
+        path = self.file("preset: fast\nseed: 1\nvo:\n  points:\n    active_points: 900\n")
+        dump = self.expect(sovo("--config", path, "--set", "seed=2", "config"), OK).stdout
+        self.assertIn("seed: 2", dump)
+        self.assertIn("active_points: 900", dump)
+        self.assertIn("immature_points: 600", dump)
+
+    def test_shipped_example_is_the_default(self):
+        dump = self.expect(sovo("config"), OK).stdout
+        self.assertEqual((ROOT / "config" / "sovo.yaml").read_text(), dump,
+                         "write it anew: sovo config > config/sovo.yaml")
+
+
+class BadInput(CommandTest):
+    def test_missing_dataset(self):
+        for command in (["run", "--dataset"], ["camera", "dataset", "--path"]):
+            with self.subTest(command=command):
+                path = self.folder / "absent"
+                result = self.expect(sovo(*command, path), BAD_INPUT)
+                self.assertIn(str(path), result.stderr)
+
+    def test_folder_that_is_no_dataset(self):
+        self.expect(sovo("run", "--dataset", self.folder), BAD_INPUT)
+
+    def test_dataset_must_be_named(self):
+        self.expect(sovo("run"), USAGE)
+        self.expect(sovo("camera", "dataset"), USAGE)
+
+    def test_calibration_with_nan(self):
+        path = self.folder / "calibration.yaml"
+        path.write_text("left: {fx: .nan}\n")
+        result = self.expect(sovo("run", "--dataset", DATASET, "--calib", path), BAD_INPUT)
+        self.assertIn(str(path), result.stderr)
+
+    def test_outputs_are_checked_before_the_run(self):
+        out = self.folder / "absent" / "out.txt"
+        result = self.expect(sovo("run", "--dataset", DATASET, "--out", out), USAGE)
+        self.assertIn("absent", result.stderr)
+
+    def test_more_frames_left_out_than_there_are(self):
+        self.expect(sovo("run", "--dataset", DATASET, "--start", 1000), BAD_INPUT)
+
+
+if __name__ == "__main__":
+    harness.main()

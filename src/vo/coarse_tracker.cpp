@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "sovo/image/interpolation.h"
+#include "sovo/image/lanes.h"
 
 namespace sovo {
 
@@ -20,15 +21,6 @@ constexpr double kStopNorm = 1e-3;
 constexpr double kMaxSaturated = 0.6;
 constexpr double kMaxCutoffFactor = 64.0;
 constexpr double kLevelRejectFactor = 1.5;
-
-using Lane = float __attribute__((vector_size(16)));
-constexpr std::size_t kLanes = 4;
-
-Lane load(const float* p) {
-  Lane v;
-  __builtin_memcpy(&v, p, sizeof(v));
-  return v;
-}
 
 /// Upper triangle of a 9x9 Gram matrix, four lanes each.
 using Accumulator = std::array<Lane, 45>;
@@ -140,11 +132,11 @@ void CoarseTracker::normal_equations(const BrightnessTransfer& transfer, double 
   const Warped& w = warped_;
   constexpr std::size_t kSpill = 256;
   for (std::size_t i = 0; i < w.n; i += kLanes) {
-    const Lane x = load(&w.x[i]);
-    const Lane y = load(&w.y[i]);
-    const Lane rho = load(&w.rho[i]);
-    const Lane gx = load(&w.gx[i]);
-    const Lane gy = load(&w.gy[i]);
+    const Lane x = load_lane(&w.x[i]);
+    const Lane y = load_lane(&w.y[i]);
+    const Lane rho = load_lane(&w.rho[i]);
+    const Lane gx = load_lane(&w.gx[i]);
+    const Lane gy = load_lane(&w.gy[i]);
     const Lane along = x * gx + y * gy;
     const std::array<Lane, 9> row = {rho * gx,
                                      rho * gy,
@@ -152,10 +144,10 @@ void CoarseTracker::normal_equations(const BrightnessTransfer& transfer, double 
                                      -(gy + y * along),
                                      gx + x * along,
                                      x * gy - y * gx,
-                                     gain * (b0 - load(&w.colour[i])),
+                                     gain * (b0 - load_lane(&w.colour[i])),
                                      -one,
-                                     load(&w.residual[i])};
-    accumulate_row(row, load(&w.weight[i]), &sums);
+                                     load_lane(&w.residual[i])};
+    accumulate_row(row, load_lane(&w.weight[i]), &sums);
     if (i % kSpill == 0) spill(&sums, &total);
   }
   spill(&sums, &total);

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sovo/image/interpolation.h"
+#include "sovo/image/lanes.h"
 
 namespace sovo {
 
@@ -66,6 +66,53 @@ bool project_pattern(const PairGeometry& g, const Point& point, const ImageF& im
   return inside;
 }
 
+/// Sums of one residual over its pattern.
+struct PatternSums {
+  float energy = 0.0F;
+  float rr = 0.0F;
+  std::array<float, 10> gram{};
+  std::array<float, 4> gram_r{};
+};
+
+/// Weighted residuals and Gram matrix of (gx, gy, ja, jb), four pixels at a time.
+PatternSums sum_pattern(const ImageF& image, const PairGeometry& g, const Point& point,
+                        const WindowConfig& config, const Positions& at) {
+  const auto huber = static_cast<float>(config.huber);
+  const auto c2 = static_cast<float>(config.gradient_constant * config.gradient_constant);
+  std::array<Lane, 16> sums{};
+  for (std::size_t k = 0; k < kPatternSize; k += kLanes) {
+    const LaneSample s = sample_lanes_with_gradient(image, &at.u[k], &at.v[k]);
+    const Lane colour = load_lane(&point.colour[k]);
+    const Lane residual = s.value - (g.gain * colour + g.bias);
+    const Lane gradient_squared = s.gx * s.gx + s.gy * s.gy;
+    Lane weight;
+    Lane energy;
+    for (std::size_t i = 0; i < kLanes; ++i) {
+      const float w = 0.5F * (std::sqrt(c2 / (c2 + gradient_squared[i])) + point.weight[k + i]);
+      const float magnitude = std::abs(residual[i]);
+      const float hw = magnitude < huber ? 1.0F : huber / magnitude;
+      weight[i] = std::sqrt(hw) * w;
+      energy[i] = w * w * hw * residual[i] * residual[i] * (2.0F - hw);
+    }
+    // d r / d (log-gain), d r / d bias of the target; the gain is the frozen one.
+    const Lane gx = weight * s.gx;
+    const Lane gy = weight * s.gy;
+    const Lane ja = -weight * g.frozen_gain * (colour - g.frozen_host_b);
+    const Lane jb = -weight;
+    const Lane wr = weight * residual;
+    const std::array<Lane, 16> terms = {gx * gx, gx * gy, gx * ja, gx * jb, gy * gy, gy * ja,
+                                        gy * jb, ja * ja, ja * jb, jb * jb, gx * wr, gy * wr,
+                                        ja * wr, jb * wr, wr * wr, energy};
+    for (std::size_t i = 0; i < terms.size(); ++i) sums[i] += terms[i];
+  }
+  PatternSums out;
+  for (std::size_t i = 0; i < 10; ++i) out.gram[i] = sum_lane(sums[i]);
+  for (std::size_t i = 0; i < 4; ++i) out.gram_r[i] = sum_lane(sums[10 + i]);
+  out.rr = sum_lane(sums[14]);
+  out.energy = sum_lane(sums[15]);
+  return out;
+}
+
 /// cross = J_pose^T J_rho from the Gram matrix and the geometric Jacobian.
 void fill_cross(Residual* r) {
   const float gu = r->gram[tri(0, 0)] * r->du_rho + r->gram[tri(0, 1)] * r->dv_rho;
@@ -96,47 +143,12 @@ float linearize(const Window& window, const WindowConfig& config, int host, int 
     return out_of_view(&r);
   }
 
-  const auto huber = static_cast<float>(config.huber);
-  const auto c2 = static_cast<float>(config.gradient_constant * config.gradient_constant);
-  std::array<float, 10> gram{};
-  std::array<float, 4> gram_r{};
-  float energy = 0.0F;
-  float rr = 0.0F;
-  for (int i = 0; i < kPatternSize; ++i) {
-    const auto k = static_cast<std::size_t>(i);
-    const Sample s = sample_with_gradient(image, at.u[i], at.v[i]);
-    const float residual_i = s.value - (g.gain * point.colour[k] + g.bias);
-    const float gradient_weight = std::sqrt(c2 / (c2 + s.gx * s.gx + s.gy * s.gy));
-    const float w = 0.5F * (gradient_weight + point.weight[k]);
-    const float magnitude = std::abs(residual_i);
-    const float hw = magnitude < huber ? 1.0F : huber / magnitude;
-    energy += w * w * hw * residual_i * residual_i * (2.0F - hw);
-    const float weight = std::sqrt(hw) * w;
-    const float gx = weight * s.gx;
-    const float gy = weight * s.gy;
-    // d r / d (log-gain), d r / d bias of the target; the gain is the frozen one.
-    const float ja = -weight * g.frozen_gain * (point.colour[k] - g.frozen_host_b);
-    const float jb = -weight;
-    const float wr = weight * residual_i;
-    gram[0] += gx * gx;
-    gram[1] += gx * gy;
-    gram[2] += gx * ja;
-    gram[3] += gx * jb;
-    gram[4] += gy * gy;
-    gram[5] += gy * ja;
-    gram[6] += gy * jb;
-    gram[7] += ja * ja;
-    gram[8] += ja * jb;
-    gram[9] += jb * jb;
-    gram_r[0] += gx * wr;
-    gram_r[1] += gy * wr;
-    gram_r[2] += ja * wr;
-    gram_r[3] += jb * wr;
-    rr += wr * wr;
-  }
-  r.gram = gram;
-  r.gram_r = gram_r;
-  r.rr = rr;
+  const PatternSums sums = sum_pattern(image, g, point, config, at);
+  const float energy = sums.energy;
+  const auto& gram = sums.gram;
+  r.gram = sums.gram;
+  r.gram_r = sums.gram_r;
+  r.rr = sums.rr;
   fill_cross(&r);
 
   r.raw_energy = energy;

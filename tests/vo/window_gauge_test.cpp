@@ -1,0 +1,173 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+
+#include "support/numeric.h"
+#include "vo/window_test_support.h"
+
+namespace sovo {
+namespace {
+
+using namespace test;
+
+constexpr int kKeyframes = 5;
+
+WindowConfig without_priors() {
+  WindowConfig config;
+  config.prior_a = config.prior_b = 0.0;
+  return config;
+}
+
+/// A window that is linearized at true poses and depths, all keyframes free.
+class WindowGauge : public ::testing::Test {
+ protected:
+  WindowGauge()
+      : pool_(1),
+        adjuster_(without_priors(), &pool_),
+        window_(scene_window(kKeyframes, 6, 1)),
+        points_(collect_points(&window_)) {}
+
+  NormalEquations linearized_system() {
+    energy_ = adjuster_.linearize_all(&window_, &points_);
+    accept(&points_);
+    return accumulate(window_, points_, &pool_);
+  }
+
+  /// The reduced normal matrix in comparable units.
+  MatX reduced(const NormalEquations& system) const {
+    const VecX units = BundleAdjuster::state_units(window_);
+    return units.asDiagonal() * (system.top - system.schur) * units.asDiagonal();
+  }
+
+  WorkerPool pool_;
+  BundleAdjuster adjuster_;
+  Window window_;
+  std::vector<PointRef> points_;
+  double energy_ = 0.0;
+};
+
+/// Rows and columns of poses alone.
+MatX pose_block(const MatX& H) {
+  const Eigen::Index n = H.rows() / 8;
+  MatX out(6 * n, 6 * n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    for (Eigen::Index j = 0; j < n; ++j) {
+      out.block<6, 6>(6 * i, 6 * j) = H.block<6, 6>(8 * i, 8 * j);
+    }
+  }
+  return out;
+}
+
+/// How many eigenvalues of a matrix vanish; checks that there is a clear gap after them.
+Eigen::Index nullity(const MatX& H, Eigen::Index expected) {
+  VecX e = Eigen::SelfAdjointEigenSolver<MatX>(H).eigenvalues().cwiseAbs();
+  std::sort(e.begin(), e.end());
+  EXPECT_GT(e[expected], 1e4 * e[expected - 1]) << "no gap: " << e.head(expected + 3).transpose();
+  EXPECT_LT(e[expected - 1], 1e-6 * e.maxCoeff());
+  return (e.array() < std::sqrt(e[expected] * e[expected - 1])).count();
+}
+
+TEST_F(WindowGauge, MotionAndScaleOfTheWorldAreUnobservable) {
+  const MatX H = reduced(linearized_system());
+  ASSERT_GT(points_.size(), 300U);
+  const MatX basis = BundleAdjuster::gauge_basis(window_, BundleAdjuster::state_units(window_));
+  ASSERT_EQ(basis.cols(), 7);
+  for (Eigen::Index c = 0; c < basis.cols(); ++c) {
+    const VecX n = basis.col(c);
+    EXPECT_LT((H * n).norm() / (H.norm() * n.norm()), 1e-6) << "direction " << c;
+  }
+}
+
+TEST_F(WindowGauge, NullspaceHasSevenDirectionsAndTwoOfBrightness) {
+  const MatX H = reduced(linearized_system());
+  EXPECT_EQ(nullity(pose_block(H), 7), 7);
+  // A gain and a bias of the whole scene are the other two; the frame priors hold them.
+  EXPECT_EQ(nullity(H, 9), 9);
+}
+
+TEST_F(WindowGauge, NullspaceStaysAwayFromTheLinearizationPoint) {
+  // First estimates: without them, displaced poses would seem to say something about the gauge.
+  displace(1.0, 5, &window_);
+  const MatX H = reduced(linearized_system());
+  EXPECT_EQ(nullity(pose_block(H), 7), 7);
+  const MatX basis = BundleAdjuster::gauge_basis(window_, BundleAdjuster::state_units(window_));
+  EXPECT_LT((H * basis).norm() / H.norm(), 1e-6);
+}
+
+TEST_F(WindowGauge, StepWithoutGaugeIsOrthogonalToIt) {
+  displace(1.0, 6, &window_);
+  const NormalEquations system = linearized_system();
+  const VecX units = BundleAdjuster::state_units(window_);
+  const MatX basis = BundleAdjuster::gauge_basis(window_, units);
+  const VecX step = units.cwiseInverse().cwiseProduct(adjuster_.solve(window_, system, 1e-3, true));
+  EXPECT_GT(step.norm(), 1e-4);
+  EXPECT_LT((basis.transpose() * step).norm(), 1e-9 * step.norm() + 1e-12);
+}
+
+class Similarity : public WindowGauge, public ::testing::WithParamInterface<double> {};
+
+TEST_P(Similarity, LeavesEnergyPriorAndStepUnchanged) {
+  const double scale = GetParam();
+  for (const double displacement : {0.0, 1.0}) {
+    displace(displacement, 7, &window_);
+    set_random_prior(8, &window_);
+    const NormalEquations before = linearized_system();
+    const double energy = energy_;
+    const double prior = adjuster_.prior_energy(window_);
+    const VecX step = adjuster_.solve(window_, before, 1e-4, true);
+    const Vec3 centre = window_.newest().T_world_camera().translation();
+    const Vec3 oldest = window_[0].T_world_camera().translation();
+    const Point point = window_[0].points[0];
+
+    window_.apply_similarity(scale);
+    EXPECT_LT((window_.newest().T_world_camera().translation() - centre).norm(), 1e-9);
+    const Vec3 moved = window_[0].T_world_camera().translation();
+    EXPECT_LT((moved - (centre + scale * (oldest - centre))).norm(), 1e-9 * scale);
+    const Point& scaled = window_[0].points[0];
+    EXPECT_NEAR(scaled.rho * scale, point.rho, 1e-12);
+    EXPECT_NEAR(scaled.hessian * std::pow(scaled.rho, 2) / (point.hessian * std::pow(point.rho, 2)),
+                1.0, 1e-9)
+        << "information on the log-depth";
+    EXPECT_NEAR(scaled.gradient * scaled.rho, point.gradient * point.rho,
+                1e-9 * std::abs(point.gradient * point.rho));
+
+    const NormalEquations after = linearized_system();
+    EXPECT_NEAR(energy_, energy, 1e-5 * energy);
+    EXPECT_NEAR(adjuster_.prior_energy(window_), prior, 1e-9 * std::abs(prior));
+    EXPECT_EQ(after.residuals, before.residuals);
+    VecX expected = step;
+    for (int i = 0; i < window_.size(); ++i) expected.segment<3>(8 * i) *= scale;
+    const VecX units = BundleAdjuster::state_units(window_).cwiseInverse();
+    EXPECT_LT(
+        relative_difference(units.cwiseProduct(adjuster_.solve(window_, after, 1e-4, true)).eval(),
+                            units.cwiseProduct(expected).eval()),
+        2e-3);
+    window_.apply_similarity(1.0 / scale);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Scales, Similarity, ::testing::Values(0.2, 0.97, 1.05, 7.0));
+
+TEST_F(WindowGauge, SimilarityScalesImmatureIntervals) {
+  ImmaturePoint p;
+  p.rho_min = 0.2F;
+  p.rho_max = 0.5F;
+  window_[1].immature = {p, ImmaturePoint()};
+  window_.apply_similarity(2.0);
+  EXPECT_FLOAT_EQ(window_[1].immature[0].rho_min, 0.1F);
+  EXPECT_FLOAT_EQ(window_[1].immature[0].rho_max, 0.25F);
+  EXPECT_TRUE(std::isnan(window_[1].immature[1].rho_max));
+}
+
+TEST_F(WindowGauge, OtherThanASimilarityChangesTheEnergy) {
+  // What the tests above would miss if the energy did not depend on lengths at all.
+  linearized_system();
+  const double energy = energy_;
+  for (const PointRef& ref : points_) ref.point->rho *= 1.05;
+  linearized_system();
+  EXPECT_GT(energy_, 1.2 * energy);
+}
+
+}  // namespace
+}  // namespace sovo

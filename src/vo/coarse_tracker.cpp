@@ -21,6 +21,8 @@ constexpr double kStopNorm = 1e-3;
 constexpr double kMaxSaturated = 0.6;
 constexpr double kMaxCutoffFactor = 64.0;
 constexpr double kLevelRejectFactor = 1.5;
+/// More change of log-gain explains no image but an unrelated one, by taking its contrast away.
+constexpr double kMaxLogGain = 1.5;
 
 /// Upper triangle of a 9x9 Gram matrix, four lanes each.
 using Accumulator = std::array<Lane, 45>;
@@ -270,7 +272,8 @@ TrackingResult CoarseTracker::try_hypothesis(const TrackingReference& reference,
   result.view_ratio = static_cast<double>(last.in_view) /
                       static_cast<double>(std::max<std::size_t>(1, reference.levels[0].size()));
   result.information = last.H.topLeftCorner<6, 6>();
-  result.good = last.in_view >= 30;
+  result.good =
+      last.in_view >= 30 && std::abs(result.affine.a - reference.affine.a) < kMaxLogGain;
   return result;
 }
 

@@ -1,0 +1,214 @@
+#include "sovo/vo/bundle_adjustment.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "support/numeric.h"
+#include "vo/window_test_support.h"
+
+namespace sovo {
+namespace {
+
+using namespace test;
+
+constexpr int kKeyframes = 5;
+
+/// The true window with poses, brightnesses and depths off by what tracking and tracing leave.
+Window perturbed_window(double size) {
+  Window window = scene_window(kKeyframes, 6);
+  std::mt19937 random(11);
+  for (int i = 1; i < window.size(); ++i) {
+    Vec8 x;
+    for (int k = 0; k < 8; ++k) x[k] = size * uniform(random, -1.0, 1.0);
+    x.head<3>() *= 0.012;
+    x.segment<3>(3) *= 0.003;
+    x[6] *= 0.02;
+    window[i].set_x(x);
+    window[i].freeze();
+  }
+  for (int h = 0; h < window.size(); ++h) {
+    for (Point& p : window[h].points) p.rho *= 1.0 + size * 0.05 * uniform(random, -1.0, 1.0);
+  }
+  window.update_geometry();
+  return window;
+}
+
+/// Energy of what a window holds, with no residual counted as an outlier.
+double energy_of(const WindowConfig& config, Window* window) {
+  WorkerPool pool(1);
+  BundleAdjuster adjuster(config, &pool);
+  std::vector<PointRef> points = collect_points(window);
+  window->newest().outlier_threshold = 1e9;
+  return adjuster.linearize_all(window, &points) + adjuster.prior_energy(*window);
+}
+
+int residuals_of(const Window& window) {
+  int n = 0;
+  for (int h = 0; h < window.size(); ++h) {
+    for (const Point& p : window[h].points) n += p.count(ResidualState::kIn);
+  }
+  return n;
+}
+
+TEST(BundleAdjustment, EnergyNeverRisesFromOneIterationToTheNext) {
+  WindowConfig config;
+  config.min_iterations = 100;  // no early stop
+  Window start = perturbed_window(1.0);
+  const int all = residuals_of(start);
+  const double first = energy_of(config, &start);
+  double last = first;
+  for (const int iterations : {1, 2, 4, 8}) {
+    Window window = perturbed_window(1.0);
+    WorkerPool pool(1);
+    config.max_iterations = iterations;
+    const BundleResult result = BundleAdjuster(config, &pool).optimize(&window);
+    EXPECT_EQ(result.iterations, iterations);
+    // Nothing may be bought by giving residuals up.
+    ASSERT_EQ(residuals_of(window), all);
+    const double energy = energy_of(config, &window);
+    EXPECT_LE(energy, last * (1.0 + 1e-9)) << "after " << iterations;
+    last = energy;
+  }
+  EXPECT_LT(last, 0.2 * first);
+}
+
+TEST(BundleAdjustment, ConvergesToTheTruthUpToScale) {
+  Window window = perturbed_window(1.0);
+  WorkerPool pool(1);
+  WindowConfig config;
+  config.max_iterations = 30;
+  const BundleResult result = BundleAdjuster(config, &pool).optimize(&window);
+  EXPECT_TRUE(result.finite);
+  EXPECT_LT(result.rmse, 2.5);
+  EXPECT_GT(result.points, 300);
+
+  // The first keyframe is the world; the scale is free.
+  EXPECT_LT(SE3(window[0].T_world_camera().inverse() * keyframe_pose(0)).log().norm(), 1e-3);
+  double scale = 0.0;
+  for (int i = 1; i < window.size(); ++i) {
+    scale += window[i].T_world_camera().translation().norm() /
+             keyframe_pose(i).translation().norm() / (window.size() - 1);
+  }
+  EXPECT_NEAR(scale, 1.0, 0.1);
+  for (int i = 1; i < window.size(); ++i) {
+    const SE3 estimate = window[i].T_world_camera();
+    const Vec3 error = estimate.translation() / scale - keyframe_pose(i).translation();
+    EXPECT_LT(error.norm(), 0.0015) << "keyframe " << i;
+    const SE3 turn = estimate.inverse() * keyframe_pose(i);
+    EXPECT_LT(turn.rotation().log().norm(), 4e-4) << "keyframe " << i;
+    EXPECT_NEAR(window[i].affine.a, 0.0, 0.015);
+  }
+  const SyntheticScene scene(3);
+  std::vector<double> errors;
+  for (int h = 0; h < window.size(); ++h) {
+    for (const Point& p : window[h].points) {
+      const double depth = scene.depth(window.camera(), keyframe_pose(h), Vec2(p.u, p.v));
+      errors.push_back(std::abs(p.rho * scale * depth - 1.0));
+    }
+  }
+  std::nth_element(errors.begin(), errors.begin() + errors.size() * 9 / 10, errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 0.02);
+  EXPECT_LT(errors[errors.size() * 9 / 10], 0.04);
+}
+
+TEST(BundleAdjustment, NumberOfThreadsChangesNoBit) {
+  std::vector<std::vector<double>> states;
+  for (const int threads : {1, 2}) {
+    Window window = perturbed_window(1.0);
+    WorkerPool pool(threads);
+    const BundleResult result = BundleAdjuster(WindowConfig(), &pool).optimize(&window);
+    std::vector<double> state = {result.rmse};
+    for (int i = 0; i < window.size(); ++i) {
+      const Mat4 T = window[i].T_camera_world.matrix();
+      state.insert(state.end(), T.data(), T.data() + 16);
+      state.push_back(window[i].affine.a);
+      state.push_back(window[i].affine.b);
+      for (const Point& p : window[i].points) {
+        state.push_back(p.rho);
+        state.push_back(p.hessian);
+      }
+    }
+    states.push_back(state);
+  }
+  for (std::size_t i = 1; i < states.size(); ++i) {
+    ASSERT_EQ(states[i].size(), states[0].size());
+    EXPECT_EQ(std::memcmp(states[i].data(), states[0].data(), 8 * states[0].size()), 0);
+  }
+}
+
+TEST(BundleAdjustment, WrongPointsBecomeOutliersAndAreDropped) {
+  Window window = perturbed_window(0.3);
+  for (int i = 0; i < window.size(); ++i) {
+    window[i].outlier_threshold = kPatternSize * WindowConfig().outlier_threshold;
+  }
+  std::vector<Point>& points = window[0].points;
+  ASSERT_GT(points.size(), 40U);
+  for (std::size_t i = 0; i < points.size(); i += 10) {
+    // Half black, half white: fits nowhere.
+    for (std::size_t k = 0; k < kPatternSize; ++k) points[i].colour[k] = k % 2 == 0 ? 0.F : 255.F;
+  }
+  WorkerPool pool(1);
+  const BundleResult result = BundleAdjuster(WindowConfig(), &pool).optimize(&window);
+  EXPECT_TRUE(result.finite);
+  int good = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (i % 10 == 0) {
+      EXPECT_EQ(points[i].count(ResidualState::kIn), 0) << "point " << i;
+      EXPECT_EQ(points[i].count(ResidualState::kOutlier), 0) << "outliers are dropped";
+      EXPECT_EQ(points[i].last_state, ResidualState::kOutlier);
+    } else if (points[i].count(ResidualState::kIn) == kKeyframes - 1) {
+      EXPECT_EQ(points[i].good_residuals, kKeyframes - 1);
+      EXPECT_GT(points[i].relative_baseline, 0.01F);
+      ++good;
+    }
+  }
+  EXPECT_GT(good, static_cast<int>(points.size()) / 2);
+  EXPECT_LT(SE3(window[1].T_world_camera().inverse() * keyframe_pose(1)).log().tail<3>().norm(),
+            0.001);
+}
+
+TEST(BundleAdjustment, NewestKeyframeEndsAtItsLinearizationPoint) {
+  Window window = perturbed_window(1.0);
+  WorkerPool pool(1);
+  const SE3 before = window[1].frozen_T_camera_world;
+  BundleAdjuster(WindowConfig(), &pool).optimize(&window);
+  EXPECT_TRUE(window.newest().x.isZero());
+  EXPECT_FALSE(window[1].x.isZero());
+  EXPECT_EQ(window[1].frozen_T_camera_world.matrix(), before.matrix()) << "first estimates stay";
+}
+
+TEST(FramePrior, HoldsTheFirstKeyframeAndPullsBrightnessToZero) {
+  const WindowConfig config;
+  auto k = make_keyframe(0, nullptr, SE3(), {0.1, 2.0});
+  const FramePrior first = frame_prior(*k, config);
+  EXPECT_GT(first.weight.minCoeff(), 1e9);
+  k->id = 4;
+  const FramePrior later = frame_prior(*k, config);
+  EXPECT_TRUE(later.weight.head<6>().isZero());
+  EXPECT_EQ(later.weight[6], config.prior_a);
+  EXPECT_EQ(later.weight[7], config.prior_b);
+  EXPECT_EQ(later.error[6], 0.1);
+  EXPECT_EQ(later.error[7], 2.0);
+}
+
+TEST(NormalEquations, DependOnlyOnResidualsThatTakePart) {
+  Window window = scene_window(3, 12);
+  WorkerPool pool(1);
+  BundleAdjuster adjuster(WindowConfig(), &pool);
+  std::vector<PointRef> points = collect_points(&window);
+  adjuster.linearize_all(&window, &points);
+  accept(&points);
+  const NormalEquations all = accumulate(window, points, &pool);
+  EXPECT_LT((all.top - all.top.transpose()).norm(), 1e-9 * all.top.norm());
+  EXPECT_LT((all.schur - all.schur.transpose()).norm(), 1e-9 * all.schur.norm());
+  const auto slot = static_cast<std::size_t>(window[2].slot);
+  for (const PointRef& ref : points) ref.point->residuals[slot].state = ResidualState::kOutlier;
+  const NormalEquations fewer = accumulate(window, points, &pool);
+  EXPECT_LT(fewer.residuals, all.residuals);
+  EXPECT_TRUE(fewer.top.bottomRows(8).isZero());
+  EXPECT_TRUE(fewer.schur.bottomRows(8).isZero());
+}
+
+}  // namespace
+}  // namespace sovo

@@ -1,0 +1,203 @@
+#include "sovo/vo/coarse_tracker.h"
+
+#include <gtest/gtest.h>
+
+#include "sovo/vo/direct_odometry.h"
+#include "support/numeric.h"
+#include "vo/window_test_support.h"
+
+namespace sovo {
+namespace {
+
+using namespace test;
+
+/// A reference of one keyframe with the true depths of the scene.
+Window one_keyframe(const SyntheticScene& scene, const Affine& affine = {}) {
+  const CameraModel camera = small_camera();
+  Window window(camera);
+  Keyframe& k = window.insert(make_keyframe(1, scene_view(scene, camera, SE3()), SE3(), affine));
+  k.points = scene_points(scene, camera, k.image(), {SE3()}, 0, 4);
+  for (Point& p : k.points) p.hessian = 1e4;
+  window.update_geometry();
+  return window;
+}
+
+TrackingReference scene_reference(const SyntheticScene& scene, const Affine& affine = {}) {
+  const Window window = one_keyframe(scene, affine);
+  return build_tracking_reference(window, window.newest().pyramid->num_levels());
+}
+
+class TrackerJacobian : public ::testing::TestWithParam<double> {};
+
+TEST_P(TrackerJacobian, AgreesWithCentralDifferencesOnASmoothImage) {
+  const double huber = GetParam();
+  const CameraModel camera = make_camera(320, 240, 260, 255, 158.7, 121.3);
+  const WaveImage wave{0.5};
+  const ImageF image = wave.sampled(camera.width, camera.height);
+  TrackingReference reference;
+  reference.affine = {0.04, 3.0};
+  reference.levels.resize(1);
+  ReferenceLevel& level = reference.levels[0];
+  level.camera = camera;
+  std::mt19937 random(4);
+  const SE3 T(SO3::exp(Vec3(0.02, -0.03, 0.04)), Vec3(0.1, -0.07, 0.12));
+  const Affine affine{-0.05, -4.0};
+  for (int i = 0; i < 203; ++i) {
+    const double u = std::floor(uniform(random, 60, 260));
+    const double v = std::floor(uniform(random, 60, 180));
+    level.u.push_back(static_cast<float>(u));
+    level.v.push_back(static_cast<float>(v));
+    level.rho.push_back(static_cast<float>(uniform(random, 0.2, 0.8)));
+    level.colour.push_back(static_cast<float>(wave(u, v) + uniform(random, -8, 8)));
+  }
+  using Residuals = Eigen::Matrix<double, 203, 1>;
+  const auto residuals = [&](const Vec8& x) {
+    const SE3 moved = SE3::exp(x.head<6>()) * T;
+    const BrightnessTransfer t =
+        brightness_transfer(reference.affine, 0.0, {affine.a + x[6], affine.b + x[7]}, 0.0);
+    Residuals r;
+    for (Eigen::Index i = 0; i < r.size(); ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      const Vec3 ray((level.u[k] - camera.cx) / camera.fx, (level.v[k] - camera.cy) / camera.fy, 1);
+      const Vec2 at = *camera.project(moved.rotation_matrix() * ray +
+                                      moved.translation() * static_cast<double>(level.rho[k]));
+      r[i] = wave(at.x(), at.y()) - (t.gain * level.colour[k] + t.bias);
+    }
+    return r;
+  };
+  const Residuals r = residuals(Vec8::Zero());
+  const Eigen::Matrix<double, 203, 8> J =
+      central_differences<203, 8>(residuals, Vec8(Vec8::Zero()), 1e-5);
+  const Residuals w = (huber / r.array().abs()).min(1.0);
+  const Mat8 H = J.transpose() * w.asDiagonal() * J;
+  const Vec8 b = J.transpose() * w.cwiseProduct(r);
+  const double energy =
+      (w.array() * r.array().square() * (2.0 - w.array())).sum() / static_cast<double>(r.size());
+
+  TrackerConfig config;
+  config.huber = huber;
+  CoarseTracker tracker(config);
+  const auto found = tracker.linearize(reference, 0, image, T,
+                                       brightness_transfer(reference.affine, 0, affine, 0), 1e3);
+  ASSERT_EQ(found.inliers, 203);
+  const Vec8 s = H.diagonal().cwiseSqrt().cwiseInverse();
+  const Mat8 expected = s.asDiagonal() * H * s.asDiagonal();
+  EXPECT_LT(relative_difference(Mat8(s.asDiagonal() * found.H * s.asDiagonal()), expected), 1e-3);
+  EXPECT_LT(relative_difference(Vec8(s.cwiseProduct(found.b)), Vec8(s.cwiseProduct(b))), 1e-3);
+  EXPECT_NEAR(found.energy, energy, 1e-3 * energy);
+}
+
+INSTANTIATE_TEST_SUITE_P(HuberThresholds, TrackerJacobian, ::testing::Values(1e4, 9.0, 2.0));
+
+TEST(CoarseTracker, SaturatedResidualsLeaveTheNormalEquations) {
+  const SyntheticScene scene(3);
+  const TrackingReference reference = scene_reference(scene);
+  const ImagePyramidPtr image = scene_view(scene, small_camera(), SE3(SO3(), Vec3(0.1, 0, 0)));
+  CoarseTracker tracker{TrackerConfig()};
+  const auto wide = tracker.linearize(reference, 0, image->level(0), SE3(), {}, 1e3);
+  const auto narrow = tracker.linearize(reference, 0, image->level(0), SE3(), {}, 5.0);
+  EXPECT_EQ(wide.inliers, wide.in_view);
+  EXPECT_EQ(narrow.in_view, wide.in_view);
+  EXPECT_LT(narrow.inliers, wide.inliers);
+  EXPECT_NEAR(narrow.saturated, 1.0 - static_cast<double>(narrow.inliers) / narrow.in_view, 1e-12);
+}
+
+TEST(CoarseTracker, RecoversMotionGainAndBias) {
+  const SyntheticScene scene(3);
+  const CameraModel camera = small_camera();
+  const Affine reference_affine{0.05, 2.0};
+  const TrackingReference reference = scene_reference(scene, reference_affine);
+  ASSERT_GT(reference.levels[0].size(), 500U);
+  const SE3 truth(SO3::exp(Vec3(0.01, -0.02, 0.015)), Vec3(0.05, -0.03, 0.08));
+  for (const auto& [gain, bias] : {std::pair(1.0, 0.0), std::pair(1.15, -6.0)}) {
+    ImageF image = scene_view(scene, camera, truth.inverse())->level(0);
+    apply_brightness(gain, bias, &image);
+    CoarseTracker tracker{TrackerConfig()};
+    const std::vector<SE3> start = {SE3()};
+    const TrackingResult result =
+        tracker.track(reference, *pyramid_of(std::move(image)), 0.0, reference_affine, start, 0.0);
+    ASSERT_TRUE(result.good);
+    const SE3 error = result.T_current_reference * truth.inverse();
+    EXPECT_LT(error.translation().norm(), 0.003);
+    EXPECT_LT(error.rotation().log().norm(), 0.001);
+    const BrightnessTransfer found = brightness_transfer(reference_affine, 0, result.affine, 0);
+    EXPECT_NEAR(found.gain, gain, 0.03);
+    // Gain and bias pull at each other; what they make of a mean grey level is well known.
+    EXPECT_NEAR(found.gain * 127.5 + found.bias, gain * 127.5 + bias, 1.0);
+    EXPECT_LT(result.rmse, 6.0);
+    EXPECT_GT(result.inlier_ratio, 0.9);
+    EXPECT_EQ(result.information, result.information.transpose());
+  }
+}
+
+TEST(CoarseTracker, TakesTheHypothesisThatFits) {
+  const SyntheticScene scene(3);
+  const TrackingReference reference = scene_reference(scene);
+  const SE3 truth(SO3::exp(Vec3(0.0, 0.17, 0.0)), Vec3(0.05, 0, 0));
+  const ImagePyramidPtr image = scene_view(scene, small_camera(), truth.inverse());
+  CoarseTracker tracker{TrackerConfig()};
+  const std::vector<SE3> hypotheses = {SE3(SO3::exp(Vec3(0, -0.25, 0)), Vec3::Zero()),
+                                       SE3(SO3::exp(Vec3(0, 0.15, 0)), Vec3::Zero()),
+                                       SE3(SO3::exp(Vec3(0, 0, 0.6)), Vec3::Zero())};
+  const TrackingResult result = tracker.track(reference, *image, 0.0, {}, hypotheses, 0.0);
+  ASSERT_TRUE(result.good);
+  EXPECT_EQ(result.hypothesis, 1);
+  EXPECT_LT((result.T_current_reference * truth.inverse()).log().norm(), 0.006);
+}
+
+TEST(CoarseTracker, UnrelatedOrEmptyImageIsLost) {
+  const SyntheticScene scene(3);
+  const CameraModel camera = small_camera();
+  const TrackingReference reference = scene_reference(scene);
+  CoarseTracker tracker{TrackerConfig()};
+  const std::vector<SE3> start = {SE3()};
+  ImageF noise(camera.width, camera.height);
+  std::mt19937 random(8);
+  for (std::size_t i = 0; i < noise.size(); ++i) {
+    noise.data()[i] = static_cast<float>(uniform(random) < 0.5 ? 0.0 : 255.0);
+  }
+  EXPECT_FALSE(tracker.track(reference, *pyramid_of(noise), 0.0, {}, start, 3.0).good);
+  noise.fill(std::numeric_limits<float>::quiet_NaN());
+  EXPECT_FALSE(tracker.track(reference, *pyramid_of(noise), 0.0, {}, start, 3.0).good);
+  const std::vector<SE3> away = {SE3(SO3::exp(Vec3(0, M_PI, 0)), Vec3::Zero())};
+  const ImagePyramidPtr same = scene_view(scene, camera, SE3());
+  EXPECT_FALSE(tracker.track(reference, *same, 0.0, {}, away, 3.0).good) << "nothing is in view";
+}
+
+TEST(TrackingReference, HoldsDepthsAtEveryLevelAndScales) {
+  const SyntheticScene scene(3);
+  const TrackingReference reference = scene_reference(scene);
+  for (std::size_t l = 0; l < reference.levels.size(); ++l) {
+    const ReferenceLevel& level = reference.levels[l];
+    ASSERT_GT(level.size(), 20U) << "level " << l;
+    std::vector<double> errors;
+    for (std::size_t i = 0; i < level.size(); ++i) {
+      const double depth = scene.depth(level.camera, SE3(), Vec2(level.u[i], level.v[i]));
+      errors.push_back(std::abs(level.rho[i] * depth - 1.0));
+    }
+    std::nth_element(errors.begin(), errors.begin() + errors.size() / 2, errors.end());
+    EXPECT_LT(errors[errors.size() / 2], 0.04) << "level " << l;
+  }
+  const TrackingReference twice = rescaled(reference, 2.0);
+  EXPECT_FLOAT_EQ(twice.levels[0].rho[5], reference.levels[0].rho[5] / 2.0F);
+  EXPECT_DOUBLE_EQ(twice.mean_rho, reference.mean_rho / 2.0);
+  EXPECT_DOUBLE_EQ(twice.log_scale, std::log(2.0));
+}
+
+TEST(MeasureFlow, IsThatOfAKnownMotion) {
+  const SyntheticScene scene(3);
+  TrackingReference reference = scene_reference(scene);
+  for (float& rho : reference.levels[0].rho) rho = 0.25F;
+  double translation = 0.0;
+  double total = 0.0;
+  measure_flow(reference, SE3(SO3(), Vec3(0.1, 0, 0)), &translation, &total);
+  const double flow = small_camera().fx * 0.1 * 0.25;
+  EXPECT_NEAR(translation, flow, 1e-6);
+  EXPECT_NEAR(total, flow, 1e-6);
+  measure_flow(reference, SE3(SO3::exp(Vec3(0, 0, 0.1)), Vec3::Zero()), &translation, &total);
+  EXPECT_NEAR(translation, 0.0, 1e-9);
+  EXPECT_GT(total, 2.0);
+}
+
+}  // namespace
+}  // namespace sovo

@@ -1,0 +1,177 @@
+#include "sovo/vo/direct_odometry.h"
+
+#include <gtest/gtest.h>
+
+#include "vo/window_test_support.h"
+
+namespace sovo {
+namespace {
+
+using namespace test;
+
+MonoFrame frame_at(const SyntheticScene& scene, const SE3& T_world_camera, int index) {
+  MonoFrame frame;
+  frame.stamp_ns = 1'000'000'000LL + 50'000'000LL * index;
+  frame.pyramid = scene_view(scene, small_camera(), T_world_camera);
+  return frame;
+}
+
+DirectConfig small_config() {
+  DirectConfig config;
+  config.points.active_points = 500;
+  config.points.immature_points = 400;
+  return config;
+}
+
+/// A map of one keyframe at the origin, with true depths of a scene.
+class Map : public ::testing::Test {
+ protected:
+  Map() : pool_(1), vo_(small_config(), small_camera(), ImageU8(), 0, &pool_) {
+    first_ = frame_at(scene_, SE3(), 0);
+    std::vector<StartPoint> points;
+    for (const SelectedPixel& pixel : vo_.select_pixels(first_, 700)) {
+      const auto rho =
+          static_cast<float>(1.0 / scene_.depth(small_camera(), SE3(), Vec2(pixel.x, pixel.y)));
+      points.push_back({pixel, {rho, 0.02F * rho}});
+    }
+    vo_.begin(first_, SE3(), points);
+  }
+
+  SyntheticScene scene_{3};
+  WorkerPool pool_;
+  DirectOdometry vo_;
+  MonoFrame first_;
+};
+
+class FirstMotion : public Map, public ::testing::WithParamInterface<Vec3> {};
+
+TEST_P(FirstMotion, IsFoundThoughNothingIsKnownOfIt) {
+  // A vehicle may already move when the map begins: steps of many pixels.
+  const SE3 truth(SO3::exp(Vec3(0.004, -0.006, 0.002)), GetParam());
+  const TrackedFrame tracked = vo_.track(frame_at(scene_, truth, 1));
+  ASSERT_TRUE(tracked.tracking.good);
+  const SE3 error = tracked.T_world_camera.inverse() * truth;
+  EXPECT_LT(error.translation().norm(), 0.02);
+  EXPECT_LT(error.rotation().log().norm(), 0.004);
+}
+
+INSTANTIATE_TEST_SUITE_P(Steps, FirstMotion,
+                         ::testing::Values(Vec3(0.02, 0, 0.01), Vec3(0, 0, 0.6), Vec3(0.45, 0, 0),
+                                           Vec3(-0.3, 0, 0.1)));
+
+TEST_F(Map, UnrelatedImageIsLostAndTheMapGoesOn) {
+  MonoFrame other = frame_at(scene_, SE3(), 1);
+  ImageF checks(small_camera().width, small_camera().height);
+  for (int y = 0; y < checks.height(); ++y) {
+    for (int x = 0; x < checks.width(); ++x) {
+      checks.at(x, y) = (x / 11 + y / 7) % 2 == 0 ? 10.0F : 240.0F;
+    }
+  }
+  other.pyramid = pyramid_of(std::move(checks));
+  EXPECT_FALSE(vo_.track(other).tracking.good);
+  EXPECT_TRUE(vo_.track(frame_at(scene_, SE3(SO3(), Vec3(0.02, 0, 0)), 2)).tracking.good);
+}
+
+/// Poses of a drive: forward and to the side, turning a little.
+SE3 drive(int i) {
+  const double s = 0.025 * i;
+  return {SO3::exp(Vec3(0.01 * std::sin(3 * s), -0.03 * s, 0.0)),
+          Vec3(1.1 * s, 0.05 * std::sin(4 * s), 0.5 * s)};
+}
+
+TEST_F(Map, GrowsAlongADriveAndKeepsItsScaleInEverySimilarity) {
+  // Corrections of scale in the middle: positions measured afterwards are in the new unit.
+  double scale = 1.0;
+  Vec3 shift = Vec3::Zero();
+  int keyframes = 1;
+  for (int i = 1; i <= 24; ++i) {
+    const TrackedFrame tracked = vo_.track(frame_at(scene_, drive(i), i));
+    ASSERT_TRUE(tracked.tracking.good) << "frame " << i;
+    const Vec3 expected = scale * drive(i).translation() + shift;
+    EXPECT_LT((tracked.T_world_camera.translation() - expected).norm(), 0.03 * scale)
+        << "frame " << i;
+    const MapResult result = vo_.map(tracked, nullptr, nullptr);
+    ASSERT_FALSE(result.failed);
+    keyframes += result.is_keyframe ? 1 : 0;
+    if (i == 12 || i == 18) {
+      const double factor = i == 12 ? 1.4 : 0.6;
+      ScaleCorrection correction;
+      correction.keyframe_id = vo_.snapshot()->id;
+      correction.scale_epoch = vo_.snapshot()->scale_epoch;
+      correction.log_scale = vo_.log_scale() - vo_.snapshot()->log_scale + std::log(factor);
+      const Vec3 fixed = vo_.window().newest().T_world_camera().translation();
+      EXPECT_NEAR(vo_.apply(correction), std::log(factor), 1e-12);
+      EXPECT_LT((vo_.window().newest().T_world_camera().translation() - fixed).norm(), 1e-9);
+      shift = factor * shift + (1.0 - factor) * fixed;
+      scale *= factor;
+    }
+  }
+  EXPECT_NEAR(vo_.log_scale(), std::log(scale), 1e-12);
+  EXPECT_GE(keyframes, 4);
+  EXPECT_LE(vo_.window().size(), DirectConfig().keyframe.max_keyframes);
+  EXPECT_EQ(vo_.keyframes().size(), static_cast<std::size_t>(keyframes));
+}
+
+TEST_F(Map, CorrectionCountsLessWhatWasAppliedSinceItsSnapshot) {
+  for (int i = 1; !vo_.snapshot() && i < 20; ++i) {
+    vo_.map(vo_.track(frame_at(scene_, drive(i), i)), nullptr, nullptr);
+  }
+  ASSERT_TRUE(vo_.snapshot());
+  ScaleCorrection late;
+  late.keyframe_id = vo_.snapshot()->id;
+  late.scale_epoch = vo_.snapshot()->scale_epoch;
+  late.log_scale = 0.3;
+  EXPECT_NEAR(vo_.apply(late), 0.3, 1e-12);
+  EXPECT_NEAR(vo_.apply(late), 0.0, 1e-12) << "the same measurement enters once";
+  EXPECT_EQ(vo_.scale_epoch(), 2U);
+  EXPECT_NEAR(vo_.reference()->log_scale, 0.3, 1e-12);
+}
+
+TEST_F(Map, SnapshotShowsTheTrueDepths) {
+  int last = 0;
+  for (int i = 1; i <= 14; ++i) {
+    const MapResult r = vo_.map(vo_.track(frame_at(scene_, drive(i), i)), nullptr, nullptr);
+    if (r.is_keyframe) last = i;
+  }
+  ASSERT_TRUE(vo_.snapshot());
+  const KeyframeSnapshot& s = *vo_.snapshot();
+  EXPECT_EQ(s.stamp_ns, frame_at(scene_, SE3(), last).stamp_ns);
+  ASSERT_GT(s.points.size(), 100U);
+  std::vector<double> errors;
+  for (std::size_t k = 0; k < s.points.size(); ++k) {
+    const Vec2 pixel(s.points.u[k], s.points.v[k]);
+    const double depth = scene_.depth(small_camera(), drive(last), pixel);
+    errors.push_back(std::abs(s.points.inverse_depth[k] * depth - 1.0));
+    EXPECT_GT(s.points.sigma[k], 0.0F);
+  }
+  std::nth_element(errors.begin(), errors.begin() + errors.size() / 2, errors.end());
+  EXPECT_LT(errors[errors.size() / 2], 0.03);
+}
+
+TEST(DirectOdometryThreads, ChangeNoBit) {
+  const SyntheticScene scene(3);
+  std::vector<MonoFrame> frames;
+  for (int i = 0; i <= 10; ++i) frames.push_back(frame_at(scene, drive(i), i));
+  std::vector<Mat4> poses[2];
+  for (const int threads : {1, 2}) {
+    WorkerPool pool(threads);
+    DirectOdometry vo(small_config(), small_camera(), ImageU8(), 5, &pool);
+    std::vector<StartPoint> points;
+    for (const SelectedPixel& pixel : vo.select_pixels(frames[0], 700)) {
+      const auto rho =
+          static_cast<float>(1.0 / scene.depth(small_camera(), SE3(), Vec2(pixel.x, pixel.y)));
+      points.push_back({pixel, {rho, 0.02F * rho}});
+    }
+    vo.begin(frames[0], SE3(), points);
+    for (std::size_t i = 1; i < frames.size(); ++i) {
+      const TrackedFrame tracked = vo.track(frames[i]);
+      poses[threads - 1].push_back(tracked.T_world_camera.matrix());
+      vo.map(tracked, nullptr, nullptr);
+    }
+  }
+  ASSERT_EQ(poses[0].size(), 10U);
+  for (std::size_t i = 0; i < 10; ++i) EXPECT_EQ(poses[0][i], poses[1][i]) << "frame " << i + 1;
+}
+
+}  // namespace
+}  // namespace sovo

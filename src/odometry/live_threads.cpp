@@ -49,6 +49,7 @@ bool LiveThreads::map_failed() const {
 }
 
 bool LiveThreads::push(MappingJob job, bool wait) {
+  const bool keyframe = job.tracked.wants_keyframe;
   std::unique_lock lock(mutex_);
   if (wait) changed_.wait(lock, [this] { return queue_.size() < queue_limit_; });
   bool complete = true;
@@ -61,6 +62,8 @@ bool LiveThreads::push(MappingJob job, bool wait) {
   queue_.push_back(std::move(job));
   lock.unlock();
   changed_.notify_all();
+  // Frames that come faster than life must not run ahead of the keyframe they need.
+  if (wait && keyframe) drain();
   return complete;
 }
 

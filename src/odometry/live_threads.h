@@ -36,8 +36,9 @@ class LiveThreads {
   /// The segment that jobs belong to; waits until all work on the former one is done.
   void set_segment(MapSegment* segment);
 
-  /// Queues a frame. With a full queue: waits when `wait`, else drops the oldest frame that does
-  /// not want to be a keyframe and returns false.
+  /// Queues a frame. `wait`: waits while the queue is full, and for keyframes until they are
+  /// mapped. Otherwise, with a full queue, drops the oldest frame that does not want to be a
+  /// keyframe and returns false.
   bool push(MappingJob job, bool wait);
 
   /// Waits until nothing is queued or under way.

@@ -22,12 +22,16 @@ double correlation_growth(double c) { return (1.0 + c) / (1.0 - c); }
 }  // namespace
 
 ScaleFilter::ScaleFilter(const ScaleFilterConfig& config)
-    : config_(config), process_noise_(config.process_noise) {}
+    : config_(config),
+      process_noise_(config.process_noise),
+      measurement_factor_(config.measurement_factor) {}
 
 void ScaleFilter::reset() {
-  const double learned = process_noise_;
+  const double process_noise = process_noise_;
+  const double measurement_factor = measurement_factor_;
   *this = ScaleFilter(config_);
-  process_noise_ = learned;
+  process_noise_ = process_noise;
+  measurement_factor_ = measurement_factor;
 }
 
 void ScaleFilter::lock_initial(double sigma, std::int64_t stamp_ns) {
@@ -68,8 +72,9 @@ ScaleUpdate ScaleFilter::update_tracking(const ScaleMeasurement& m) {
     return update;
   }
   update.innovation = m.estimate.log_scale - m.pending_log_scale;
-  update.nis = square(update.innovation) / (variance_ + square(m.estimate.sigma));
-  learn(update.nis);
+  const double innovation_variance = variance_ + measured_variance(m);
+  update.nis = square(update.innovation) / innovation_variance;
+  learn(update.innovation, innovation_variance);
   if (!within_gate(update)) {
     update.verdict = ScaleVerdict::kInnovation;
     disagree();
@@ -82,7 +87,7 @@ ScaleUpdate ScaleFilter::update_cold(const ScaleMeasurement& m) {
   ScaleUpdate update;
   update.verdict = m.estimate.verdict;
   update.innovation = m.estimate.log_scale - m.pending_log_scale;
-  const double variance = square(m.estimate.sigma);
+  const double variance = measured_variance(m);
   if (update.verdict == ScaleVerdict::kAccepted) {
     if (!locked_) return lock_on(m, update, variance);
     update.nis = square(update.innovation) / (variance_ + variance);
@@ -103,7 +108,7 @@ ScaleUpdate ScaleFilter::update_cold(const ScaleMeasurement& m) {
 /// Kalman correction. The gain takes measurements as independent, for correlation is no reason to
 /// lag behind; the covariance (Joseph form) counts it.
 ScaleUpdate ScaleFilter::correct(const ScaleMeasurement& m, ScaleUpdate update) {
-  const double R = square(m.estimate.sigma);
+  const double R = measured_variance(m);
   const double K = variance_ / (variance_ + R);
   const double c = config_.max_correlation * std::clamp(m.shared_points, 0.0, 1.0);
   update.apply = true;
@@ -136,11 +141,26 @@ void ScaleFilter::disagree() {
   if (disagreements_ >= config_.cold_start_after) searching_ = true;
 }
 
-/// Moves the process noise so that the mean of the normalized innovation squared becomes one.
-void ScaleFilter::learn(double nis) {
-  const double excess = std::min(nis, square(config_.gate_sigmas)) - 1.0;
-  process_noise_ = std::clamp(process_noise_ * std::exp(config_.learning_rate * excess),
-                              config_.min_process_noise, config_.max_process_noise);
+/// Innovations of a filter that knows its noises are white and as large as it expects. Their size
+/// moves both noises alike; their correlation from one keyframe to the next tilts them: negative,
+/// the gain is too high, and noise of the last measurement is being corrected (Mehra, "On the
+/// identification of variances and adaptive Kalman filtering").
+void ScaleFilter::learn(double innovation, double variance) {
+  const double normalized =
+      std::clamp(innovation / std::sqrt(variance), -config_.gate_sigmas, config_.gate_sigmas);
+  const double excess = square(normalized) - 1.0;
+  const double correlation = normalized * last_normalized_;
+  last_normalized_ = normalized;
+  process_noise_ =
+      std::clamp(process_noise_ * std::exp(config_.learning_rate * (excess + correlation)),
+                 config_.min_process_noise, config_.max_process_noise);
+  measurement_factor_ =
+      std::clamp(measurement_factor_ * std::exp(config_.learning_rate * (excess - correlation)),
+                 config_.min_measurement_factor, config_.max_measurement_factor);
+}
+
+double ScaleFilter::measured_variance(const ScaleMeasurement& m) const {
+  return measurement_factor_ * square(m.estimate.sigma);
 }
 
 bool ScaleFilter::within_gate(const ScaleUpdate& update) const {

@@ -11,11 +11,16 @@ struct ScaleFilterConfig {
   /// Random walk of the log-scale error: variance a unit of distance, where the distance between
   /// keyframes is counted in median depths of the points. A monocular window renews its points,
   /// and so forgets its scale, by parallax: this makes one number fit a cave and a street.
-  double process_noise = 3e-4;
-  double min_process_noise = 3e-5;  ///< Bounds of what is learned.
+  double process_noise = 1e-4;
+  double min_process_noise = 1e-5;  ///< Bounds of what is learned.
   double max_process_noise = 3e-3;
+  /// Variance of a measurement over the one that its optimizer claims: keyframes share points,
+  /// occlusions and reflections, which no residual shows.
+  double measurement_factor = 4.0;
+  double min_measurement_factor = 1.0;  ///< Bounds of what is learned.
+  double max_measurement_factor = 30.0;
   double min_distance = 0.02;     ///< Distance counted at least, a keyframe [median depths].
-  double learning_rate = 0.05;    ///< Of process noise from innovations; 0 holds it.
+  double learning_rate = 0.05;    ///< Of both noises from innovations; 0 holds them.
   double gate_sigmas = 3.0;       ///< Innovations beyond are confident disagreements.
   int cold_start_after = 6;       ///< Disagreements in a row that ask for a cold start.
   double max_correlation = 0.85;  ///< Of measurements on keyframes that share all their points.
@@ -28,7 +33,11 @@ struct ScaleFilterConfig {
     v("min_process_noise", min_process_noise, "least process noise that is learned");
     v("max_process_noise", max_process_noise, "largest process noise that is learned");
     v("min_distance", min_distance, "distance counted at least, a keyframe [median depths]");
-    v("learning_rate", learning_rate, "of the process noise; 0 holds it");
+    v("measurement_factor", measurement_factor,
+      "variance of a measurement over the one that the optimizer claims");
+    v("min_measurement_factor", min_measurement_factor, "least factor that is learned");
+    v("max_measurement_factor", max_measurement_factor, "largest factor that is learned");
+    v("learning_rate", learning_rate, "of process noise and measurement factor; 0 holds them");
     v("gate_sigmas", gate_sigmas, "innovations beyond this are disagreements");
     v("cold_start_after", cold_start_after, "disagreements in a row that ask for a cold start");
     v("max_correlation", max_correlation,
@@ -71,7 +80,7 @@ class ScaleFilter {
   /// Stereo depth has given the window its scale: starts locked, with this standard deviation.
   void lock_initial(double sigma, std::int64_t stamp_ns);
 
-  /// Forgets everything but the learned process noise.
+  /// Forgets everything but the learned noises.
   void reset();
 
   ScaleUpdate update(const ScaleMeasurement& measurement);
@@ -89,6 +98,7 @@ class ScaleFilter {
   ScaleVerdict last_verdict() const { return last_verdict_; }
   int disagreements() const { return disagreements_; }
   double process_noise() const { return process_noise_; }
+  double measurement_factor() const { return measurement_factor_; }
 
  private:
   struct Candidate {
@@ -101,7 +111,8 @@ class ScaleFilter {
   ScaleUpdate correct(const ScaleMeasurement& m, ScaleUpdate update);
   ScaleUpdate lock_on(const ScaleMeasurement& m, ScaleUpdate update, double variance);
   void disagree();
-  void learn(double nis);
+  void learn(double innovation, double variance);
+  double measured_variance(const ScaleMeasurement& m) const;
   bool within_gate(const ScaleUpdate& update) const;
   double walked(const ScaleMeasurement& m) const;
 
@@ -111,6 +122,8 @@ class ScaleFilter {
   double variance_ = 0.0;   ///< P
   double path_variance_ = 0.0;
   double process_noise_ = 0.0;
+  double measurement_factor_ = 1.0;
+  double last_normalized_ = 0.0;  ///< Innovation over its standard deviation, the one before.
   int disagreements_ = 0;
   std::int64_t accepted_stamp_ns_ = 0;
   ScaleVerdict last_verdict_ = ScaleVerdict::kTooFewPoints;

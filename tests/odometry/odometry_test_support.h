@@ -1,0 +1,168 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "sovo/odometry/stereo_odometry.h"
+#include "support/cameras.h"
+#include "support/synthetic_scene.h"
+
+namespace sovo::test {
+
+inline constexpr double kBaseline = 0.11;
+inline constexpr std::int64_t kPeriodNs = 50'000'000;
+
+/// Small enough to be rendered in milliseconds; the right camera is another one than the left.
+inline StereoCameras test_cameras() {
+  StereoCameras cameras;
+  cameras.rig.left = make_camera(240, 180, 195, 195, 119.2, 90.6);
+  cameras.rig.right = make_camera(240, 180, 199, 198, 121.0, 88.3);
+  cameras.rig.T_right_left = SE3(SO3::exp(Vec3(0.004, -0.003, 0.006)), Vec3(-kBaseline, 0.002, 0));
+  return cameras;
+}
+
+/// A vehicle that comes forward and to the side, turning and swaying a little.
+inline SE3 drive(int i) {
+  const double s = 0.02 * i;
+  return {SO3::exp(Vec3(0.012 * std::sin(5 * s), -0.12 * s, 0.015 * std::sin(3 * s))),
+          Vec3(1.3 * s, 0.06 * std::sin(4 * s), 0.7 * s)};
+}
+
+inline SideImage side_of(const ImageF& image) {
+  const ImageU8 grey = quantized(image);
+  SideImage side;
+  side.valid = true;
+  side.width = side.step = grey.width();
+  side.height = grey.height();
+  side.data = std::make_shared<std::vector<std::uint8_t>>(grey.data(), grey.data() + grey.size());
+  return side;
+}
+
+/// Frame `i` of the drive; rendered once a program.
+inline StereoFrame drive_frame(int i) {
+  static const SyntheticScene scene(3);
+  static const StereoCameras cameras = test_cameras();
+  static std::map<int, StereoFrame> rendered;
+  const auto found = rendered.find(i);
+  if (found != rendered.end()) return found->second;
+  StereoFrame frame;
+  frame.stamp_ns = 1'000'000'000 + i * kPeriodNs;
+  frame.sequence = static_cast<std::uint64_t>(i);
+  frame.session = 7;
+  const SE3 pose = drive(i);
+  frame.left = side_of(scene.render(cameras.rig.left, pose));
+  frame.right = side_of(scene.render(cameras.rig.right, pose * cameras.rig.T_right_left.inverse()));
+  return rendered.emplace(i, frame).first->second;
+}
+
+/// The same frame with every pixel of a side set.
+inline StereoFrame with_left(StereoFrame frame, const std::function<int(int x, int y)>& value) {
+  auto data = std::make_shared<std::vector<std::uint8_t>>(*frame.left.data);
+  for (int y = 0; y < frame.left.height; ++y) {
+    for (int x = 0; x < frame.left.width; ++x) {
+      (*data)[static_cast<std::size_t>(y * frame.left.step + x)] =
+          static_cast<std::uint8_t>(value(x, y));
+    }
+  }
+  frame.left.data = data;
+  return frame;
+}
+
+/// An image that has nothing to do with the drive, another one for each `i`.
+inline StereoFrame unrelated_frame(int i) {
+  return with_left(drive_frame(i), [i](int x, int y) {
+    return ((x + 3 * i) / (9 + i % 3) + y / 7) % 2 == 0 ? 10 : 240;
+  });
+}
+
+inline StereoOdometryConfig test_config() {
+  StereoOdometryConfig config;
+  config.deterministic = true;
+  config.threads = 1;
+  config.vo.points.active_points = 600;
+  config.vo.points.immature_points = 500;
+  return config;
+}
+
+/// Keeps all that an odometry gives out.
+class Recorder : public OutputSink {
+ public:
+  void on_frame(const OdometryOutput& output) override { frames.push_back(output); }
+  void on_keyframe(const KeyframeOutput& keyframe) override { keyframes.push_back(keyframe); }
+  void on_scale(const ScaleRecord& record) override { scales.push_back(record); }
+
+  std::vector<OdometryOutput> frames;
+  std::vector<KeyframeOutput> keyframes;
+  std::vector<ScaleRecord> scales;
+};
+
+/// An odometry with its outputs.
+struct Playback {
+  explicit Playback(const StereoOdometryConfig& config,
+                    const StereoCameras& cameras = test_cameras())
+      : odometry(config, cameras, &recorder) {}
+
+  /// Gives a frame; checks that it yields exactly one output, and returns it.
+  OdometryOutput give(const StereoFrame& frame) {
+    const std::size_t before = recorder.frames.size();
+    odometry.process(frame);
+    EXPECT_EQ(recorder.frames.size(), before + 1);
+    EXPECT_EQ(recorder.frames.back().stamp_ns, frame.stamp_ns);
+    return recorder.frames.back();
+  }
+
+  void give_drive(int from, int to) {
+    for (int i = from; i < to; ++i) give(drive_frame(i));
+  }
+
+  Recorder recorder;
+  StereoOdometry odometry;
+};
+
+/// How far a trajectory is from the drive, its first pose laid on the drive's; and the ratio of
+/// its length to the drive's.
+struct DriveError {
+  double rms = 0.0;    ///< Of position [m].
+  double scale = 0.0;  ///< Estimated over true path length.
+};
+
+inline int index_of(std::int64_t stamp_ns) {
+  return static_cast<int>((stamp_ns - 1'000'000'000) / kPeriodNs);
+}
+
+inline DriveError drive_error(const std::vector<TrajectoryPose>& trajectory) {
+  const SE3 T_drive_odom =
+      drive(index_of(trajectory.front().stamp_ns)) * trajectory.front().T_odom_left.inverse();
+  double squares = 0.0;
+  double length = 0.0;
+  double true_length = 0.0;
+  const TrajectoryPose* last = nullptr;
+  for (const TrajectoryPose& p : trajectory) {
+    const SE3 truth = drive(index_of(p.stamp_ns));
+    const Vec3 error = T_drive_odom * p.T_odom_left.translation() - truth.translation();
+    squares += error.squaredNorm();
+    if (last != nullptr) {
+      length += (p.T_odom_left.translation() - last->T_odom_left.translation()).norm();
+      true_length += (truth.translation() - drive(index_of(last->stamp_ns)).translation()).norm();
+    }
+    last = &p;
+  }
+  return {std::sqrt(squares / static_cast<double>(trajectory.size())), length / true_length};
+}
+
+/// The poses that were published.
+inline std::vector<TrajectoryPose> published(const Recorder& recorder) {
+  std::vector<TrajectoryPose> out;
+  for (const OdometryOutput& o : recorder.frames) {
+    if (o.pose_valid) out.push_back({o.stamp_ns, o.T_odom_left});
+  }
+  return out;
+}
+
+}  // namespace sovo::test

@@ -1,0 +1,320 @@
+#include "sovo/odometry/stereo_odometry.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "odometry/odometry_test_support.h"
+
+namespace sovo {
+namespace {
+
+using namespace test;
+
+constexpr int kFrames = 24;
+
+void expect_follows_the_drive(const std::vector<TrajectoryPose>& trajectory, double rms,
+                              double scale) {
+  ASSERT_GT(trajectory.size(), 2U);
+  for (std::size_t i = 1; i < trajectory.size(); ++i) {
+    ASSERT_GT(trajectory[i].stamp_ns, trajectory[i - 1].stamp_ns);
+  }
+  const DriveError error = drive_error(trajectory);
+  EXPECT_LT(error.rms, rms);
+  EXPECT_NEAR(error.scale, 1.0, scale);
+}
+
+TEST(StereoOdometry, FollowsADriveInMetres) {
+  Playback run(test_config());
+  run.give_drive(0, kFrames);
+  run.odometry.finish();
+  for (const OdometryOutput& o : run.recorder.frames) {
+    EXPECT_TRUE(o.pose_valid);
+    EXPECT_TRUE(o.scale_valid);
+    EXPECT_EQ(o.state, OdometryState::kTracking) << o.reason;
+    EXPECT_EQ(o.reason, "");
+    EXPECT_EQ(o.segment, 0U);
+    EXPECT_EQ(o.session, 7U);
+  }
+  const OdometryOutput& last = run.recorder.frames.back();
+  EXPECT_EQ(last.received, static_cast<std::uint64_t>(kFrames));
+  EXPECT_EQ(last.rejected, 0U);
+  EXPECT_EQ(last.dropped_queue, 0U);
+  EXPECT_GT(last.points, 200U);
+  EXPECT_GT(last.keyframes, 2U);
+  const Vec3 motion = drive(kFrames - 1).translation() - drive(kFrames - 2).translation();
+  EXPECT_NEAR(last.velocity.head<3>().norm(), motion.norm() / (1e-9 * kPeriodNs), 0.15);
+  EXPECT_GT(last.pose_covariance.diagonal().minCoeff(), 0.0);
+
+  expect_follows_the_drive(published(run.recorder), 0.015, 0.03);
+  const auto refined = run.odometry.refined_trajectory();
+  EXPECT_EQ(refined.size(), static_cast<std::size_t>(kFrames));
+  expect_follows_the_drive(refined, 0.015, 0.03);
+  EXPECT_LT(refined[0].T_odom_left.log().norm(), 2e-3);
+  EXPECT_TRUE(run.recorder.frames[0].T_odom_left.matrix().isIdentity(1e-12));
+
+  EXPECT_GE(run.recorder.keyframes.size(), 3U);
+  EXPECT_GE(run.recorder.scales.size(), 3U);
+  for (const KeyframeOutput& k : run.recorder.keyframes) {
+    EXPECT_EQ(k.u.size(), k.inverse_depth.size());
+    EXPECT_EQ(k.u.size(), k.intensity.size());
+  }
+}
+
+TEST(StereoOdometry, RepeatedRunIsTheSameToTheLastBitWithOneThreadOrTwo) {
+  std::vector<std::vector<TrajectoryPose>> results;
+  for (const int threads : {1, 1, 2}) {
+    StereoOdometryConfig config = test_config();
+    config.threads = threads;
+    Playback run(config);
+    run.give_drive(0, 18);
+    results.push_back(run.odometry.refined_trajectory());
+    const auto live = published(run.recorder);
+    results.back().insert(results.back().end(), live.begin(), live.end());
+  }
+  for (std::size_t k = 1; k < results.size(); ++k) {
+    ASSERT_EQ(results[k].size(), results[0].size());
+    for (std::size_t i = 0; i < results[0].size(); ++i) {
+      const Mat4 a = results[0][i].T_odom_left.matrix();
+      const Mat4 b = results[k][i].T_odom_left.matrix();
+      EXPECT_EQ(std::memcmp(a.data(), b.data(), sizeof(double) * 16), 0) << "pose " << i;
+    }
+  }
+}
+
+TEST(StereoOdometry, LiveThreadsFollowTheDriveToo) {
+  StereoOdometryConfig config = test_config();
+  config.deterministic = false;
+  config.threads = 2;
+  config.wait_for_mapping = true;
+  Playback run(config);
+  run.give_drive(0, kFrames);
+  run.odometry.finish();
+  EXPECT_EQ(run.recorder.frames.back().dropped_queue, 0U);
+  expect_follows_the_drive(published(run.recorder), 0.02, 0.04);
+  EXPECT_EQ(run.odometry.refined_trajectory().size(), static_cast<std::size_t>(kFrames));
+  expect_follows_the_drive(run.odometry.refined_trajectory(), 0.02, 0.04);
+  EXPECT_GE(run.recorder.keyframes.size(), 3U);
+  // A scale job that is overtaken by the next keyframe is left out.
+  EXPECT_GE(run.recorder.scales.size(), 1U);
+}
+
+TEST(StereoOdometry, MonoModeClaimsNoScale) {
+  StereoOdometryConfig config = test_config();
+  config.mode = OdometryMode::kMono;
+  Playback run(config);
+  run.give_drive(0, 15);
+  for (const OdometryOutput& o : run.recorder.frames) {
+    EXPECT_TRUE(o.pose_valid);
+    EXPECT_FALSE(o.scale_valid);
+    EXPECT_EQ(o.state, OdometryState::kTracking) << o.reason;
+  }
+  EXPECT_TRUE(run.recorder.scales.empty());
+  // Its first keyframe has stereo depth all the same.
+  expect_follows_the_drive(run.odometry.refined_trajectory(), 0.02, 0.06);
+}
+
+TEST(StereoOdometry, TwoViewStartFindsItsScale) {
+  StereoOdometryConfig config = test_config();
+  config.init = InitMethod::kTwoView;
+  Playback run(config);
+  for (int i = 0; i < 2 * kFrames && run.recorder.scales.size() < 4; ++i) run.give(drive_frame(i));
+  const auto& frames = run.recorder.frames;
+  EXPECT_EQ(frames[0].state, OdometryState::kInitializing);
+  EXPECT_FALSE(frames[0].pose_valid);
+  EXPECT_NE(frames[1].reason.find("two views"), std::string::npos) << frames[1].reason;
+  ASSERT_TRUE(frames.back().scale_valid) << frames.back().reason;
+  const auto start = std::find_if(run.recorder.scales.begin(), run.recorder.scales.end(),
+                                  [](const ScaleRecord& r) { return r.correction != 0.0; });
+  ASSERT_NE(start, run.recorder.scales.end());
+  EXPECT_GT(std::abs(start->correction), 0.05) << "a map without unit is not metric by chance";
+  // What was built before the scale was known is metric in the refined trajectory, too.
+  expect_follows_the_drive(run.odometry.refined_trajectory(), 0.02, 0.05);
+}
+
+TEST(StereoOdometry, WrongScaleAtTheStartIsCorrected) {
+  // The first right image comes from a rig with a shorter baseline: its depths are too long.
+  StereoFrame first = drive_frame(0);
+  const SyntheticScene scene(3);
+  const StereoCameras cameras = test_cameras();
+  SE3 narrow = cameras.rig.T_right_left;
+  narrow.translation() *= 0.93;
+  first.right = side_of(scene.render(cameras.rig.right, narrow.inverse()));
+  Playback run(test_config());
+  run.give(first);
+  run.give_drive(1, kFrames);
+  double sum = 0.0;
+  for (const ScaleRecord& r : run.recorder.scales) sum += r.correction;
+  // Depths came out 1 / 0.93 too long.
+  EXPECT_NEAR(sum, std::log(0.93), 0.03);
+  EXPECT_NEAR(run.recorder.frames.back().log_scale, sum, 0.005);
+  const auto trajectory = run.odometry.refined_trajectory();
+  const std::vector<TrajectoryPose> second_half(trajectory.begin() + kFrames / 2, trajectory.end());
+  EXPECT_NEAR(drive_error(second_half).scale, 1.0, 0.04);
+}
+
+TEST(StereoOdometry, StampsThatRepeatOrGoBackAreRefused) {
+  Playback run(test_config());
+  run.give_drive(0, 4);
+  const OdometryOutput repeated = run.give(drive_frame(3));
+  EXPECT_EQ(repeated.state, OdometryState::kDegraded);
+  EXPECT_FALSE(repeated.pose_valid);
+  EXPECT_NE(repeated.reason.find("repeats"), std::string::npos) << repeated.reason;
+  EXPECT_EQ(repeated.rejected, 1U);
+  const OdometryOutput reversed = run.give(drive_frame(1));
+  EXPECT_NE(reversed.reason.find("older"), std::string::npos) << reversed.reason;
+  EXPECT_EQ(reversed.rejected, 2U);
+  EXPECT_EQ(reversed.received, 6U);
+  run.give_drive(4, 8);
+  EXPECT_EQ(run.recorder.frames.back().state, OdometryState::kTracking);
+  expect_follows_the_drive(published(run.recorder), 0.015, 0.05);
+}
+
+TEST(StereoOdometry, BadImagesAreReportedAndTrackingGoesOn) {
+  Playback run(test_config());
+  run.give_drive(0, 4);
+  const auto refused = [&](const StereoFrame& frame, const std::string& word) {
+    const OdometryOutput o = run.give(frame);
+    EXPECT_EQ(o.state, OdometryState::kDegraded);
+    EXPECT_FALSE(o.pose_valid);
+    EXPECT_NE(o.reason.find("left"), std::string::npos) << o.reason;
+    EXPECT_NE(o.reason.find(word), std::string::npos) << o.reason;
+  };
+  const auto without_scale = [&](const StereoFrame& frame, const std::string& word) {
+    const OdometryOutput o = run.give(frame);
+    EXPECT_EQ(o.state, OdometryState::kDegraded);
+    EXPECT_TRUE(o.pose_valid);
+    EXPECT_NE(o.reason.find("right"), std::string::npos) << o.reason;
+    EXPECT_NE(o.reason.find(word), std::string::npos) << o.reason;
+  };
+  refused(with_left(drive_frame(4), [](int, int) { return 0; }), "black");
+  StereoFrame frame = drive_frame(5);
+  frame.left.valid = frame.right.valid = false;
+  refused(frame, "missing");
+  frame = drive_frame(6);
+  frame.left.width = 239;
+  refused(frame, "239x180");
+  frame = drive_frame(7);
+  frame.left.data = std::make_shared<std::vector<std::uint8_t>>(100);
+  refused(frame, "shorter");
+  frame = drive_frame(7);
+  frame.left.data = nullptr;
+  refused(frame, "missing");
+  EXPECT_EQ(run.recorder.frames.back().rejected, 5U);
+  frame = drive_frame(8);
+  frame.right.valid = false;
+  without_scale(frame, "missing");
+  frame = drive_frame(9);
+  frame.right.height = 90;
+  without_scale(frame, "240x90");
+  run.give_drive(10, 16);
+  EXPECT_EQ(run.recorder.frames.back().state, OdometryState::kTracking)
+      << run.recorder.frames.back().reason;
+  expect_follows_the_drive(published(run.recorder), 0.015, 0.05);
+  EXPECT_EQ(run.odometry.refined_trajectory().size(), published(run.recorder).size());
+}
+
+TEST(StereoOdometry, NothingButBadImagesNeverBegins) {
+  StereoOdometryConfig config = test_config();
+  config.init = InitMethod::kStereo;
+  Playback run(config);
+  const OdometryOutput black = run.give(with_left(drive_frame(0), [](int, int) { return 0; }));
+  EXPECT_EQ(black.state, OdometryState::kInitializing);
+  EXPECT_NE(black.reason.find("black"), std::string::npos) << black.reason;
+  StereoFrame frame = drive_frame(1);
+  frame.right.valid = false;
+  EXPECT_NE(run.give(frame).reason.find("right image"), std::string::npos);
+  const OdometryOutput grey = run.give(with_left(drive_frame(2), [](int, int) { return 90; }));
+  EXPECT_EQ(grey.state, OdometryState::kInitializing);
+  EXPECT_NE(grey.reason.find("matches"), std::string::npos) << grey.reason;
+  EXPECT_TRUE(run.odometry.refined_trajectory().empty());
+  EXPECT_TRUE(run.give(drive_frame(3)).pose_valid);
+}
+
+TEST(StereoOdometry, AfterALossANewSegmentBeginsWhereTheOldOneEnded) {
+  StereoOdometryConfig config = test_config();
+  config.lost_frames = 3;
+  Playback run(config);
+  run.give_drive(0, 6);
+  const SE3 last = run.recorder.frames.back().T_odom_left;
+  for (int i = 6; i < 9; ++i) {
+    const OdometryOutput o = run.give(unrelated_frame(i));
+    EXPECT_EQ(o.state, OdometryState::kLost);
+    EXPECT_FALSE(o.pose_valid);
+    EXPECT_NE(o.reason, "");
+    EXPECT_EQ(o.segment, i < 8 ? 0U : 1U);
+  }
+  EXPECT_NE(run.recorder.frames.back().reason.find("new segment"), std::string::npos);
+  const OdometryOutput again = run.give(drive_frame(9));
+  EXPECT_TRUE(again.pose_valid) << again.reason;
+  EXPECT_EQ(again.segment, 1U);
+  EXPECT_TRUE(again.T_odom_left.matrix().isApprox(last.matrix(), 1e-12));
+  run.give_drive(10, 16);
+  EXPECT_EQ(run.recorder.frames.back().state, OdometryState::kTracking);
+  const auto refined = run.odometry.refined_trajectory();
+  ASSERT_EQ(refined.size(), 13U);
+  EXPECT_NEAR(drive_error({refined.begin() + 6, refined.end()}).scale, 1.0, 0.05);
+}
+
+TEST(StereoOdometry, OneUnrelatedFrameLosesNoMap) {
+  Playback run(test_config());
+  run.give_drive(0, 6);
+  EXPECT_EQ(run.give(unrelated_frame(6)).state, OdometryState::kLost);
+  run.give_drive(7, 12);
+  EXPECT_EQ(run.recorder.frames.back().segment, 0U);
+  expect_follows_the_drive(published(run.recorder), 0.015, 0.05);
+}
+
+TEST(StereoOdometry, ResetBeginsAnew) {
+  for (const bool deterministic : {true, false}) {
+    StereoOdometryConfig config = test_config();
+    config.deterministic = deterministic;
+    Playback run(config);
+    run.give_drive(0, 8);
+    run.odometry.reset();
+    run.give_drive(8, 14);
+    const OdometryOutput& last = run.recorder.frames.back();
+    EXPECT_EQ(last.reset_counter, 1U);
+    EXPECT_EQ(last.segment, 1U);
+    EXPECT_TRUE(last.pose_valid);
+    run.odometry.finish();
+    const auto refined = run.odometry.refined_trajectory();
+    EXPECT_EQ(refined.size(), 14U);
+    EXPECT_LT((refined[8].T_odom_left.translation() - refined[7].T_odom_left.translation()).norm(),
+              0.02);
+  }
+}
+
+TEST(StereoOdometry, StagesAreTimedOnceAFrame) {
+  class Counter : public StageObserver {
+   public:
+    void on_stage(Stage stage, double seconds) override {
+      EXPECT_GE(seconds, 0.0);
+      ++count[static_cast<std::size_t>(stage)];
+    }
+    void on_window(std::uint32_t points, std::uint32_t residuals) override {
+      EXPECT_GT(points, 0U);
+      EXPECT_GT(residuals, 0U);
+      ++windows;
+    }
+    std::array<int, static_cast<std::size_t>(Stage::kCount)> count{};
+    int windows = 0;
+  } counter;
+  Recorder recorder;
+  StereoOdometry odometry(test_config(), test_cameras(), &recorder, &counter);
+  for (int i = 0; i < 12; ++i) odometry.process(drive_frame(i));
+  const auto of = [&](Stage s) { return counter.count[static_cast<std::size_t>(s)]; };
+  EXPECT_EQ(of(Stage::kFrame), 12);
+  EXPECT_EQ(of(Stage::kPyramid), 12);
+  EXPECT_EQ(of(Stage::kTracking), 11);
+  EXPECT_EQ(of(Stage::kTracing), 11);
+  const auto keyframes = static_cast<int>(recorder.keyframes.size());
+  EXPECT_GT(keyframes, 0);
+  EXPECT_EQ(of(Stage::kBundleAdjustment), keyframes);
+  EXPECT_EQ(of(Stage::kMarginalization), keyframes);
+  EXPECT_EQ(of(Stage::kScaleOptimization), keyframes);
+  EXPECT_EQ(counter.windows, keyframes);
+}
+
+}  // namespace
+}  // namespace sovo

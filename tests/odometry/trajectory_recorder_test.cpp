@@ -1,0 +1,136 @@
+#include "sovo/odometry/trajectory_recorder.h"
+
+#include <gtest/gtest.h>
+
+#include "support/synthetic_scene.h"
+
+namespace sovo {
+namespace {
+
+SE3 at(double x, double y = 0.0, double z = 0.0) { return {SO3(), Vec3(x, y, z)}; }
+
+KeyframePose keyframe(std::uint32_t id, const SE3& pose) {
+  KeyframePose k;
+  k.id = id;
+  k.stamp_ns = 100 * (id + 1);
+  k.T_world_camera = pose;
+  return k;
+}
+
+/// A window that is corrected in scale at each keyframe, as DirectOdometry does and records it.
+class CorrectedWindow {
+ public:
+  void add(const Vec3& position) {
+    keyframes_.push_back(
+        keyframe(static_cast<std::uint32_t>(keyframes_.size()), {SO3(), position}));
+    keyframes_.back().log_scale = log_scale_;
+  }
+  void correct(double log_scale) {
+    const double s = std::exp(log_scale);
+    const Vec3 centre = keyframes_.back().T_world_camera.translation();
+    for (KeyframePose& k : keyframes_) {
+      Vec3& p = k.T_world_camera.translation();
+      p = centre + s * (p - centre);
+      if (&k == &keyframes_.back()) continue;
+      k.later_scale *= s;
+      k.later_shift = s * k.later_shift + (1.0 - s) * centre;
+    }
+    log_scale_ += log_scale;
+    keyframes_.back().own_log_scale += log_scale;
+    keyframes_.back().log_scale = log_scale_;
+  }
+  const std::vector<KeyframePose>& keyframes() const { return keyframes_; }
+  Vec3 newest() const { return keyframes_.back().T_world_camera.translation(); }
+
+ private:
+  std::vector<KeyframePose> keyframes_;
+  double log_scale_ = 0.0;
+};
+
+TEST(RefinedKeyframePoses, WithoutSimilaritiesAreThoseOfTheWindow) {
+  CorrectedWindow window;
+  for (int i = 0; i < 5; ++i) window.add(Vec3(i, 0.1 * i * i, 0));
+  const auto poses = refined_keyframe_poses(window.keyframes());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    EXPECT_LT((poses[i].translation() - window.keyframes()[i].T_world_camera.translation()).norm(),
+              1e-12);
+  }
+}
+
+TEST(RefinedKeyframePoses, LaterSimilaritiesAreUndone) {
+  // The map's unit drifts by 10 % a keyframe, and each keyframe's own measurement puts it right:
+  // every step comes out a metre long.
+  CorrectedWindow window;
+  window.add(Vec3::Zero());
+  for (int i = 1; i < 6; ++i) {
+    window.add(window.newest() + Vec3(1.1, 0, 0));
+    window.correct(-std::log(1.1));
+  }
+  const auto poses = refined_keyframe_poses(window.keyframes());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    EXPECT_NEAR(poses[i].translation().x(), static_cast<double>(i), 1e-9) << "keyframe " << i;
+  }
+  // The window itself has shrunk its past again and again.
+  const double past = window.newest().x() - window.keyframes()[0].T_world_camera.translation().x();
+  EXPECT_LT(past, 4.5);
+}
+
+TEST(RefinedKeyframePoses, OfNoneAreNone) { EXPECT_TRUE(refined_keyframe_poses({}).empty()); }
+
+TrackedFrame tracked(std::int64_t stamp_ns, std::uint32_t keyframe_id, const SE3& T_frame_keyframe,
+                     double log_scale) {
+  auto reference = std::make_shared<TrackingReference>();
+  reference->keyframe_id = keyframe_id;
+  reference->log_scale = log_scale;
+  TrackedFrame t;
+  t.frame.stamp_ns = stamp_ns;
+  t.reference = reference;
+  t.tracking.T_current_reference = T_frame_keyframe;
+  return t;
+}
+
+TEST(TrajectoryRecorder, FramesHangOnTheirKeyframesAsThoseAreKnownLater) {
+  TrajectoryRecorder recorder;
+  recorder.add(tracked(100, 0, SE3(), 0.0));         // keyframe 0
+  recorder.add(tracked(150, 0, at(-0.5), 0.0));      // half a metre on
+  recorder.add(tracked(200, 0, at(-1.0), 0.0));      // becomes keyframe 1
+  recorder.add(tracked(250, 1, at(0, -0.25), 0.0));  // to the side
+  std::vector<KeyframePose> keyframes = {keyframe(0, at(0)), keyframe(1, at(1.2))};
+  const auto trajectory = recorder.trajectory(&keyframes);
+  ASSERT_EQ(trajectory.size(), 4U);
+  EXPECT_NEAR(trajectory[1].T_odom_left.translation().x(), 0.5, 1e-12);
+  EXPECT_NEAR(trajectory[2].T_odom_left.translation().x(), 1.2, 1e-12) << "as refined";
+  EXPECT_LT((trajectory[3].T_odom_left.translation() - Vec3(1.2, 0.25, 0)).norm(), 1e-12);
+  EXPECT_EQ(trajectory[3].stamp_ns, 250);
+}
+
+TEST(TrajectoryRecorder, RelativePosesTakeTheScaleOfTheirKeyframe) {
+  // A frame was tracked before its keyframe's scale was measured.
+  TrajectoryRecorder recorder;
+  recorder.add(tracked(150, 0, at(-0.5), 0.0));
+  recorder.add(tracked(160, 0, at(-1.0), std::log(2.0)));
+  KeyframePose k = keyframe(0, at(0));
+  k.log_scale = std::log(2.0);
+  const std::vector<KeyframePose> keyframes = {k};
+  const auto trajectory = recorder.trajectory(&keyframes);
+  EXPECT_NEAR(trajectory[0].T_odom_left.translation().x(), 1.0, 1e-12);
+  EXPECT_NEAR(trajectory[1].T_odom_left.translation().x(), 1.0, 1e-12);
+}
+
+TEST(TrajectoryRecorder, ClosedSegmentsStay) {
+  TrajectoryRecorder recorder;
+  recorder.add(tracked(100, 0, SE3(), 0.0));
+  recorder.close_segment({keyframe(0, at(3))});
+  KeyframePose k = keyframe(0, at(7));
+  k.stamp_ns = 500;
+  recorder.add(tracked(500, 0, SE3(), 0.0));
+  const std::vector<KeyframePose> keyframes = {k};
+  const auto trajectory = recorder.trajectory(&keyframes);
+  ASSERT_EQ(trajectory.size(), 2U);
+  EXPECT_EQ(trajectory[0].T_odom_left.translation().x(), 3.0);
+  EXPECT_EQ(trajectory[1].T_odom_left.translation().x(), 7.0);
+  EXPECT_EQ(recorder.trajectory(nullptr).size(), 1U);
+}
+
+}  // namespace
+}  // namespace sovo

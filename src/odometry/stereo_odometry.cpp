@@ -98,6 +98,7 @@ class StereoOdometry::Impl {
                                             &pool_, observer_);
     if (threads_) threads_->set_segment(segment_.get());
     failures_ = 0;
+    distance_ = 0.0;
     published_.reset();
   }
 

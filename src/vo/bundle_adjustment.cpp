@@ -108,6 +108,18 @@ void BundleAdjuster::update_outlier_threshold(Window* window,
   threshold = e * e;
 }
 
+double BundleAdjuster::classify(Window* window, const std::vector<PointRef>& points) const {
+  double energy = 0.0;
+  for (const PointRef& ref : points) {
+    for (int t = 0; t < window->size(); ++t) {
+      Residual& r = ref.point->residuals[static_cast<std::size_t>((*window)[t].slot)];
+      if (r.state == ResidualState::kAbsent) continue;
+      energy += sovo::classify((*window)[ref.host], (*window)[t], &r);
+    }
+  }
+  return energy;
+}
+
 VecX BundleAdjuster::state_units(const Window& window) {
   const double depth = 1.0 / window.mean_inverse_depth();
   Vec8 unit;
@@ -230,9 +242,9 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   BundleResult result;
   std::vector<PointRef> points = collect_points(window);
   window->update_geometry();
-  double energy = linearize_all(window, &points);
+  linearize_all(window, &points);
   update_outlier_threshold(window, points);
-  energy = linearize_all(window, &points) + prior_energy(*window);
+  double energy = classify(window, points) + prior_energy(*window);
   accept_states(points, window);
 
   double lambda = config_.damping;

@@ -55,6 +55,8 @@ class BundleAdjuster {
 
  private:
   void accept_states(const std::vector<PointRef>& points, Window* window) const;
+  /// Decides all residuals anew for changed thresholds. Returns their energy.
+  double classify(Window* window, const std::vector<PointRef>& points) const;
   void update_outlier_threshold(Window* window, const std::vector<PointRef>& points) const;
   /// Applies the step to poses and, by back-substitution, to depths. True when all are small.
   bool apply_step(Window* window, const std::vector<PointRef>& points, const VecX& dx,

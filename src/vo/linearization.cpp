@@ -33,6 +33,9 @@ bool geometric_jacobian(const CameraModel& camera, const PairGeometry& g, const 
   return true;
 }
 
+/// Sum of squared gradients below which a pattern says nothing.
+constexpr float kMinGradientEnergy = 2.0F;
+
 struct Positions {
   float u[kPatternSize], v[kPatternSize];
 };
@@ -144,23 +147,25 @@ float linearize(const Window& window, const WindowConfig& config, int host, int 
   }
 
   const PatternSums sums = sum_pattern(image, g, point, config, at);
-  const float energy = sums.energy;
-  const auto& gram = sums.gram;
   r.gram = sums.gram;
   r.gram_r = sums.gram_r;
   r.rr = sums.rr;
   fill_cross(&r);
 
-  r.raw_energy = energy;
+  r.raw_energy = sums.energy;
+  r.new_state = ResidualState::kIn;
+  return classify(window[host], target_frame, &r);
+}
+
+float classify(const Keyframe& host, const Keyframe& target, Residual* residual) {
+  Residual& r = *residual;
+  if (r.new_state == ResidualState::kOutOfView) return r.new_energy;
   const auto threshold =
-      static_cast<float>(std::max(window[host].outlier_threshold, target_frame.outlier_threshold));
-  if (!(energy <= threshold) || gram[0] + gram[4] < 2.0F) {
-    r.new_state = ResidualState::kOutlier;
-    r.new_energy = threshold;
-  } else {
-    r.new_state = ResidualState::kIn;
-    r.new_energy = energy;
-  }
+      static_cast<float>(std::max(host.outlier_threshold, target.outlier_threshold));
+  const bool textured = r.gram[tri(0, 0)] + r.gram[tri(1, 1)] >= kMinGradientEnergy;
+  const bool inlier = r.raw_energy <= threshold && textured;
+  r.new_state = inlier ? ResidualState::kIn : ResidualState::kOutlier;
+  r.new_energy = inlier ? r.raw_energy : threshold;
   return r.new_energy;
 }
 

@@ -13,6 +13,10 @@ namespace sovo {
 float linearize(const Window& window, const WindowConfig& config, int host, int target,
                 const Point& point, Residual* residual);
 
+/// Decides from a linearized residual's energy and the outlier thresholds of its keyframes whether
+/// it is an inlier; out of view stays so. Returns the new energy.
+float classify(const Keyframe& host, const Keyframe& target, Residual* residual);
+
 /// The 8x8 normal matrix and the gradient of a residual in relative coordinates (pose, a, b of the
 /// target while the host stays), added to H and b.
 void accumulate_relative(const Residual& residual, Mat8* H, Vec8* b);

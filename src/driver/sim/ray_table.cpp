@@ -1,0 +1,88 @@
+#include "sovo/driver/sim/ray_table.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace sovo::sim {
+
+RayTable::RayTable(const CameraModel& camera)
+    : camera_(camera),
+      tiles_x_((camera.width + kTile - 1) / kTile),
+      tiles_y_((camera.height + kTile - 1) / kTile) {
+  const std::size_t count = offset(num_tiles());
+  for (auto* values : {&dx_, &dy_, &dz_, &angle_}) values->assign(count, 0.0F);
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      const auto ray = camera.unproject({x, y});
+      if (!ray) continue;
+      const std::size_t i = index(x, y);
+      dx_[i] = static_cast<float>(ray->x());
+      dy_[i] = static_cast<float>(ray->y());
+      dz_[i] = static_cast<float>(ray->z());
+    }
+  }
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      const float area = ray_step_x(x, y).cross(ray_step_y(x, y)).norm();
+      angle_[index(x, y)] = std::sqrt(std::max(1e-12F, area));
+    }
+  }
+  for (int t = 0; t < num_tiles(); ++t) {
+    cones_.push_back(cone_of(t % tiles_x_ * kTile, t / tiles_x_ * kTile, kTile));
+  }
+  constexpr int kBlockSide = kBlock * kTile;
+  for (int b = 0; b < blocks_x() * blocks_y(); ++b) {
+    blocks_.push_back(
+        cone_of(b % blocks_x() * kBlockSide, b / blocks_x() * kBlockSide, kBlockSide));
+  }
+}
+
+Eigen::Vector3f RayTable::ray_step_x(int x, int y) const {
+  const int a = std::max(0, x - 1);
+  const int b = std::min(camera_.width - 1, x + 1);
+  const Eigen::Vector3f r0 = ray(a, y);
+  const Eigen::Vector3f r1 = ray(b, y);
+  if (b == a || r0.isZero() || r1.isZero()) return Eigen::Vector3f::Zero();
+  return (r1 - r0) / static_cast<float>(b - a);
+}
+
+Eigen::Vector3f RayTable::ray_step_y(int x, int y) const {
+  const int a = std::max(0, y - 1);
+  const int b = std::min(camera_.height - 1, y + 1);
+  const Eigen::Vector3f r0 = ray(x, a);
+  const Eigen::Vector3f r1 = ray(x, b);
+  if (b == a || r0.isZero() || r1.isZero()) return Eigen::Vector3f::Zero();
+  return (r1 - r0) / static_cast<float>(b - a);
+}
+
+RayCone RayTable::cone_of(int x0, int y0, int side) const {
+  const int x1 = std::min(camera_.width, x0 + side);
+  const int y1 = std::min(camera_.height, y0 + side);
+  Vec3 sum = Vec3::Zero();
+  for (int y = y0; y < y1; ++y) {
+    for (int x = x0; x < x1; ++x) sum += ray(x, y).cast<double>();
+  }
+  RayCone cone;
+  if (sum.norm() < 1e-6) return cone;
+  const Vec3 axis = sum.normalized();
+  double widest = 0.0;
+  double pixel = 0.0;
+  for (int y = y0; y < y1; ++y) {
+    for (int x = x0; x < x1; ++x) {
+      const Vec3 r = ray(x, y).cast<double>();
+      if (r.isZero()) continue;
+      widest = std::max(widest, std::acos(std::clamp(axis.dot(r), -1.0, 1.0)));
+      pixel = std::max(pixel, double{angle_[index(x, y)]});
+    }
+  }
+  // Rays through a pixel's corners belong to it.
+  const double angle = std::min(3.14, widest + 2.0 * pixel + 1e-4);
+  for (int i = 0; i < 3; ++i) cone.axis[i] = static_cast<float>(axis[i]);
+  cone.cos_angle = static_cast<float>(std::cos(angle));
+  cone.sin_angle = static_cast<float>(std::sin(angle));
+  cone.empty = false;
+  return cone;
+}
+
+}  // namespace sovo::sim

@@ -1,0 +1,129 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <utility>
+
+namespace sovo::sim {
+
+enum class World {
+  kLawn,    ///< Grass seen by someone who walks an 8 m square.
+  kPool,    ///< A swimming pool's floor seen by a vehicle that mows it in lanes of 3.6 m.
+  kStreet,  ///< Houses, trees and cars along a drive.
+  kHall,    ///< A machine hall around a small aircraft.
+};
+
+/// A side of the pair, or neither.
+enum class Side { kNone, kLeft, kRight };
+
+/// Of which body a trajectory file's poses are.
+enum class TrajectoryBody {
+  kAuto,    ///< Found out from the poses, see `load_motion`.
+  kCamera,  ///< Left camera: x right, y down, z forward.
+  kBase,    ///< Vehicle: x forward, y left, z up.
+  kImuXUp,  ///< EuRoC's body: x up, y right, z forward.
+};
+
+/// Names of enum values in configuration files, found by argument-dependent lookup.
+constexpr std::array<std::pair<World, const char*>, 4> enum_names(World) {
+  return {{{World::kLawn, "lawn"},
+           {World::kPool, "pool"},
+           {World::kStreet, "street"},
+           {World::kHall, "hall"}}};
+}
+constexpr std::array<std::pair<Side, const char*>, 3> enum_names(Side) {
+  return {{{Side::kNone, "none"}, {Side::kLeft, "left"}, {Side::kRight, "right"}}};
+}
+constexpr std::array<std::pair<TrajectoryBody, const char*>, 4> enum_names(TrajectoryBody) {
+  return {{{TrajectoryBody::kAuto, "auto"},
+           {TrajectoryBody::kCamera, "camera"},
+           {TrajectoryBody::kBase, "base"},
+           {TrajectoryBody::kImuXUp, "imu_x_up"}}};
+}
+
+/// What two real cameras do to light.
+struct SensorConfig {
+  bool auto_exposure = true;
+  bool shared_exposure = true;
+  double exposure_ms = 0.0;
+  double gain_db = 0.0;
+  double max_exposure_ms = 15.0;
+  double max_gain_db = 18.0;
+  double target_grey = 105.0;
+  double exposure_speed = 0.25;
+  double vignette = 0.15;
+  double response_gamma = 1.0;
+  bool calibrated = true;
+  double read_noise = 0.6;
+  double shot_noise = 0.8;
+  bool motion_blur = true;
+  double right_offset_ms = 0.0;
+  double drop_rate = 0.0;
+  Side dark = Side::kNone;
+  double dark_from_s = 0.0;
+  double dark_until_s = 1e9;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("auto_exposure", auto_exposure, "exposure, then gain, follow the mean grey level");
+    v("shared_exposure", shared_exposure, "both cameras expose as the left one does");
+    v("exposure_ms", exposure_ms, "exposure without auto_exposure [ms]; 0: what suits the world");
+    v("gain_db", gain_db, "gain without auto_exposure [dB]");
+    v("max_exposure_ms", max_exposure_ms, "longest exposure that auto_exposure takes [ms]");
+    v("max_gain_db", max_gain_db, "largest gain that auto_exposure takes [dB]");
+    v("target_grey", target_grey, "mean grey level that auto_exposure aims at");
+    v("exposure_speed", exposure_speed, "share of an exposure error mended from frame to frame");
+    v("vignette", vignette, "loss of light in the corners, 0 to 0.9");
+    v("response_gamma", response_gamma, "grey level = 255 * light ^ (1 / gamma)");
+    v("calibrated", calibrated, "response and vignette are part of the calibration");
+    v("read_noise", read_noise, "standard deviation in the dark at no gain [grey levels]");
+    v("shot_noise", shot_noise, "standard deviation added by light, at full scale [grey levels]");
+    v("motion_blur", motion_blur, "blur by motion during the exposure");
+    v("right_offset_ms", right_offset_ms, "the right camera exposes later by this [ms]");
+    v("drop_rate", drop_rate, "share of pairs that are lost");
+    v("dark", dark, "camera that goes dark");
+    v("dark_from_s", dark_from_s, "time from which on it is dark [s]");
+    v("dark_until_s", dark_until_s, "time until which it is dark [s]");
+  }
+};
+
+/// Simulated cameras in a world.
+struct SimConfig {
+  World world = World::kLawn;
+  std::uint64_t seed = 1;
+  int frames = 0;
+  double frame_rate = 0.0;
+  bool real_time = false;
+  bool restamp = false;
+  bool reverse = false;
+  std::string calibration;
+  std::string trajectory;
+  std::string trajectory_times;
+  TrajectoryBody trajectory_body = TrajectoryBody::kAuto;
+  double start_s = 0.0;
+  int threads = 2;
+  std::string frame_id = "cam_left_camera_optical_frame";
+  SensorConfig sensor;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("world", world, "lawn, pool, street or hall");
+    v("seed", seed, "of the world and the noise");
+    v("frames", frames, "pairs at most; 0: to the end of the trajectory");
+    v("frame_rate", frame_rate, "pairs a second of the world's time [Hz]; 0: what suits it");
+    v("real_time", real_time, "give pairs at their rate, not as fast as they are rendered");
+    v("restamp", restamp, "stamps begin now, not in 2020 or with the trajectory file");
+    v("reverse", reverse, "fly the trajectory backwards");
+    v("calibration", calibration, "calibration file of the cameras; empty: the world's own");
+    v("trajectory", trajectory, "TUM, EuRoC or KITTI poses; empty: the world's own trajectory");
+    v("trajectory_times", trajectory_times, "KITTI times file of the trajectory");
+    v("trajectory_body", trajectory_body, "of which body the trajectory's poses are");
+    v("start_s", start_s, "time of the trajectory left out at the beginning [s]");
+    v("threads", threads, "1 or 2: cameras rendered at once; changes no pixel");
+    v("frame_id", frame_id, "name of the left optical frame");
+    v("sensor", sensor, "what the cameras do to the light");
+  }
+};
+
+}  // namespace sovo::sim

@@ -1,0 +1,19 @@
+#include "sovo/driver/sim/world.h"
+
+namespace sovo::sim {
+
+Scene build_scene(World world, const Motion& motion, std::uint64_t seed) {
+  switch (world) {
+    case World::kLawn:
+      return build_lawn(motion, seed);
+    case World::kPool:
+      return build_pool(motion, seed);
+    case World::kStreet:
+      return build_street(motion, seed);
+    case World::kHall:
+      break;
+  }
+  return build_hall(motion, seed);
+}
+
+}  // namespace sovo::sim

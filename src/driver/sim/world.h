@@ -1,0 +1,37 @@
+#pragma once
+
+#include <string>
+
+#include "sovo/driver/sim/motion.h"
+#include "sovo/driver/sim/scene.h"
+#include "sovo/driver/sim/sim_config.h"
+#include "sovo/geometry/stereo_rig.h"
+#include "sovo/io/result.h"
+
+namespace sovo::sim {
+
+/// The motion of the left camera that belongs to a world; z is up, the ground at z = 0.
+Motion own_motion(World world);
+
+/// Cameras that suit a world.
+StereoRig own_rig(World world);
+
+/// Pairs a second that suit a world [Hz].
+double own_frame_rate(World world);
+
+/// The motion of the left camera from a trajectory file, brought into the world: z up, the ground
+/// below it, beginning near the origin. Of which body the poses are, and which way is up, is found
+/// from the axis that stays upright, unless `body` says it. In the street and on the lawn slow
+/// changes of height are taken away, for their ground is level.
+Result<Motion> load_motion(const SimConfig& config, const StereoRig& rig);
+
+/// The world around a motion: nothing stands in its way.
+Scene build_scene(World world, const Motion& motion, std::uint64_t seed);
+
+// The single worlds.
+Scene build_lawn(const Motion& motion, std::uint64_t seed);
+Scene build_pool(const Motion& motion, std::uint64_t seed);
+Scene build_street(const Motion& motion, std::uint64_t seed);
+Scene build_hall(const Motion& motion, std::uint64_t seed);
+
+}  // namespace sovo::sim

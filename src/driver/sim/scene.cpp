@@ -37,6 +37,11 @@ int SceneBuilder::texture(const ImageF& pattern) {
 }
 
 int SceneBuilder::material(Material material) {
+  for (Layer& l : material.layers) {
+    const double area = std::abs(l.map[0] * l.map[3] - l.map[1] * l.map[2]);
+    const int size = scene_.textures[static_cast<std::size_t>(l.texture)].size();
+    l.log_texels = static_cast<float>(std::log2(size * std::sqrt(area)));
+  }
   scene_.materials.push_back(std::move(material));
   return static_cast<int>(scene_.materials.size()) - 1;
 }

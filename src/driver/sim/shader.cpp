@@ -7,21 +7,6 @@
 
 namespace sovo::sim {
 
-/// The spot that a pixel sees of a surface.
-struct Shader::Spot {
-  double x = 0.0;  ///< On the surface [m].
-  double y = 0.0;
-  Vec3 world = Vec3::Zero();
-  /// Half axes' directions times lengths: the spot's long and short diameter on the surface [m].
-  float long_x = 0.0F, long_y = 0.0F;
-  float short_x = 0.0F, short_y = 0.0F;
-  /// The same over the world's x and y.
-  float world_long_x = 0.0F, world_long_y = 0.0F;
-  float world_short_x = 0.0F, world_short_y = 0.0F;
-  float diameter = 0.0F;  ///< Short one [m].
-  float light = 1.0F;
-};
-
 namespace {
 
 constexpr int kMaxProbes = 4;
@@ -39,33 +24,54 @@ float dot(const float* a, const Eigen::Vector3f& b) {
   return a[0] * b.x() + a[1] * b.y() + a[2] * b.z();
 }
 
+/// Where a spot lies on a pattern.
+struct PatternSpot {
+  double u = 0.0, v = 0.0;             ///< [sides]
+  float long_u = 0.0F, long_v = 0.0F;  ///< Long diameter [sides].
+  float log_texels = 0.0F;             ///< log2 of texels per metre.
+};
+
+/// How a spot is cut into round ones, each looked up at its own resolution.
+struct Probes {
+  int count = 1;
+  float log_long = 0.0F;   ///< log2 of the long diameter [m].
+  float log_probe = 0.0F;  ///< log2 of the diameter of one [m].
+};
+
 /// Mean of a texture over a spot: samples along its long diameter, each as wide as the short one.
-float sample_spot(const Texture& texture, double u, double v, float long_u, float long_v,
-                  float short_u, float short_v) {
-  const auto size = static_cast<float>(texture.size());
-  float longer = std::sqrt(long_u * long_u + long_v * long_v);
-  float shorter = std::sqrt(short_u * short_u + short_v * short_v);
-  if (shorter > longer) {
-    std::swap(longer, shorter);
-    long_u = short_u;
-    long_v = short_v;
-  }
-  const float texels = longer * size;
-  const float ratio = std::min(texels, longer / std::max(shorter, 1e-9F));
-  const int probes = std::clamp(static_cast<int>(std::ceil(ratio)), 1, kMaxProbes);
-  const float width = std::max(shorter, longer / static_cast<float>(probes));
-  const float level = log2_linear(std::max(1e-6F, width * size)) + kLevelBias;
+float sample_spot(const Texture& texture, const PatternSpot& spot, const Probes& probes) {
+  TexturePlace place{texture_fraction(spot.u), texture_fraction(spot.v)};
+  if (probes.log_long + spot.log_texels <= 0.0F) return texture.sample(place, 0.0F);
+  const float level = probes.log_probe + spot.log_texels + kLevelBias;
+  if (probes.count == 1) return texture.sample(place, level);
   if (level >= static_cast<float>(texture.num_levels() - 1)) return texture.mean();
-  if (probes == 1) return texture.sample(u, v, level);
+  const float share = 1.0F / static_cast<float>(probes.count);
+  const std::uint32_t du = texture_fraction(double{spot.long_u * share});
+  const std::uint32_t dv = texture_fraction(double{spot.long_v * share});
+  const double back = 0.5 * (probes.count - 1) * double{share};
+  place.u -= texture_fraction(back * double{spot.long_u});
+  place.v -= texture_fraction(back * double{spot.long_v});
   float sum = 0.0F;
-  for (int i = 0; i < probes; ++i) {
-    const float at = (static_cast<float>(i) + 0.5F) / static_cast<float>(probes) - 0.5F;
-    sum += texture.sample(u + at * long_u, v + at * long_v, level);
+  for (int i = 0; i < probes.count; ++i) {
+    sum += texture.sample(place, level);
+    place.u += du;
+    place.v += dv;
   }
-  return sum / static_cast<float>(probes);
+  return sum * share;
 }
 
 }  // namespace
+
+/// The spot that a pixel sees of a surface: an ellipse.
+struct Shader::Spot {
+  double x = 0.0;  ///< On the surface [m].
+  double y = 0.0;
+  Vec3 world = Vec3::Zero();
+  float long_x = 0.0F, long_y = 0.0F;              ///< Its long diameter on the surface [m].
+  float world_long_x = 0.0F, world_long_y = 0.0F;  ///< The same over the world's x and y.
+  Probes probes;
+  float light = 1.0F;
+};
 
 void Shader::update(const SE3& T_world_camera, double t) {
   T_world_camera_ = T_world_camera;
@@ -101,25 +107,20 @@ Shader::Spot Shader::spot(const SurfaceView& view, const Eigen::Vector3f& ray, f
   const float du = u.dot(ray);
   const float dv = v.dot(ray);
   const float sine = std::sqrt(du * du + dv * dv);
-  const float cx = sine > 1e-4F ? du / sine : 1.0F;
-  const float cy = sine > 1e-4F ? dv / sine : 0.0F;
-  spot.diameter = range * pixel_angle;
-  const float length = spot.diameter / cosine;
-  spot.long_x = cx * length;
-  spot.long_y = cy * length;
-  spot.short_x = -cy * spot.diameter;
-  spot.short_y = cx * spot.diameter;
+  const float diameter = range * pixel_angle;
+  const float longer = diameter / cosine;
+  spot.long_x = sine > 1e-4F ? du / sine * longer : longer;
+  spot.long_y = sine > 1e-4F ? dv / sine * longer : 0.0F;
   if (s.n.z() > 0.9) {  // only level surfaces wear the world's patterns
     const auto ax = static_cast<float>(s.u.x());
     const auto ay = static_cast<float>(s.u.y());
     spot.world_long_x = ax * spot.long_x - ay * spot.long_y;
     spot.world_long_y = ay * spot.long_x + ax * spot.long_y;
-    spot.world_short_x = ax * spot.short_x - ay * spot.short_y;
-    spot.world_short_y = ay * spot.short_x + ax * spot.short_y;
-  } else {
-    spot.world_long_x = length;
-    spot.world_short_y = length;
   }
+  spot.probes.count = std::clamp(static_cast<int>(std::ceil(1.0F / cosine)), 1, kMaxProbes);
+  spot.probes.log_long = log2_linear(std::max(1e-9F, longer));
+  const float widest = longer / static_cast<float>(spot.probes.count);
+  spot.probes.log_probe = log2_linear(std::max({1e-9F, diameter, widest}));
   if (s.foot_shade > 0.0F) {
     const double z = std::max(0.0, spot.world.z());
     spot.light *= 1.0F - s.foot_shade * static_cast<float>(std::exp(-1.6 * z));
@@ -131,18 +132,15 @@ Shader::Spot Shader::spot(const SurfaceView& view, const Eigen::Vector3f& ray, f
 float Shader::pattern(const Layer& l, const Spot& p) const {
   const double x = l.world ? p.world.x() : p.x;
   const double y = l.world ? p.world.y() : p.y;
-  const auto m0 = static_cast<float>(l.map[0]);
-  const auto m1 = static_cast<float>(l.map[1]);
-  const auto m2 = static_cast<float>(l.map[2]);
-  const auto m3 = static_cast<float>(l.map[3]);
-  const float lx = l.world ? p.world_long_x : p.long_x;
-  const float ly = l.world ? p.world_long_y : p.long_y;
-  const float sx = l.world ? p.world_short_x : p.short_x;
-  const float sy = l.world ? p.world_short_y : p.short_y;
-  return sample_spot(scene_->textures[static_cast<std::size_t>(l.texture)],
-                     l.map[0] * x + l.map[1] * y + l.velocity[0] * time_,
-                     l.map[2] * x + l.map[3] * y + l.velocity[1] * time_, m0 * lx + m1 * ly,
-                     m2 * lx + m3 * ly, m0 * sx + m1 * sy, m2 * sx + m3 * sy);
+  const double lx = double{l.world ? p.world_long_x : p.long_x};
+  const double ly = double{l.world ? p.world_long_y : p.long_y};
+  PatternSpot spot;
+  spot.u = l.map[0] * x + l.map[1] * y + l.velocity[0] * time_;
+  spot.v = l.map[2] * x + l.map[3] * y + l.velocity[1] * time_;
+  spot.long_u = static_cast<float>(l.map[0] * lx + l.map[1] * ly);
+  spot.long_v = static_cast<float>(l.map[2] * lx + l.map[3] * ly);
+  spot.log_texels = l.log_texels;
+  return sample_spot(scene_->textures[static_cast<std::size_t>(l.texture)], spot, p.probes);
 }
 
 float Shader::reflected(const Material& material, const Spot& spot) const {
@@ -174,14 +172,20 @@ float Shader::caustics(const Spot& p) const {
   const double x = p.world.x() + 0.4 * p.world.z();
   const double y = p.world.y() + 0.3 * p.world.z();
   const double wobble = 0.05 * std::sin(1.1 * time_);
-  const float a =
-      sample_spot(net, 0.31 * x + 0.05 * y + 0.055 * time_, 0.31 * y - 0.05 * x + wobble,
-                  0.31F * p.world_long_x, 0.31F * p.world_long_y, 0.31F * p.world_short_x,
-                  0.31F * p.world_short_y);
-  const float b =
-      sample_spot(net, 0.43 * x - 0.11 * y - 0.05 * time_,
-                  0.43 * y + 0.11 * x + 0.04 * time_ - wobble, 0.43F * p.world_long_x,
-                  0.43F * p.world_long_y, 0.43F * p.world_short_x, 0.43F * p.world_short_y);
+  const auto texels = static_cast<float>(net.size());
+  PatternSpot spot;
+  spot.u = 0.31 * x + 0.05 * y + 0.055 * time_;
+  spot.v = 0.31 * y - 0.05 * x + wobble;
+  spot.long_u = 0.31F * p.world_long_x;
+  spot.long_v = 0.31F * p.world_long_y;
+  spot.log_texels = log2_linear(0.31F * texels);
+  const float a = sample_spot(net, spot, p.probes);
+  spot.u = 0.43 * x - 0.11 * y - 0.05 * time_;
+  spot.v = 0.43 * y + 0.11 * x + 0.04 * time_ - wobble;
+  spot.long_u = 0.43F * p.world_long_x;
+  spot.long_v = 0.43F * p.world_long_y;
+  spot.log_texels = log2_linear(0.44F * texels);
+  const float b = sample_spot(net, spot, p.probes);
   return 1.0F + scene_->caustic_strength * (a + b + 3.0F * a * b - 2.0F * net.mean());
 }
 
@@ -194,11 +198,15 @@ Shader::Sample Shader::surface(const SurfaceView& view, const Eigen::Vector3f& r
   if (material.opacity >= 0) {
     const double du = 0.5 / s.half_u;
     const double dv = 0.5 / s.half_v;
-    const auto fu = static_cast<float>(du);
-    const auto fv = static_cast<float>(dv);
-    sample.opacity =
-        sample_spot(scene_->textures[static_cast<std::size_t>(material.opacity)], p.x * du + 0.5,
-                    p.y * dv + 0.5, fu * p.long_x, fv * p.long_y, fu * p.short_x, fv * p.short_y);
+    const Texture& texture = scene_->textures[static_cast<std::size_t>(material.opacity)];
+    PatternSpot cover;
+    cover.u = p.x * du + 0.5;
+    cover.v = p.y * dv + 0.5;
+    cover.long_u = static_cast<float>(du) * p.long_x;
+    cover.long_v = static_cast<float>(dv) * p.long_y;
+    cover.log_texels =
+        log2_linear(static_cast<float>(texture.size() * 0.5 / std::sqrt(s.half_u * s.half_v)));
+    sample.opacity = sample_spot(texture, cover, p.probes);
     if (s.decal) sample.opacity *= 0.62F;
     if (sample.opacity < 0.004F) return {0.0F, 0.0F};
   }

@@ -17,21 +17,32 @@ ImageF halved(const ImageF& image) {
   return half;
 }
 
+/// Every texel with its neighbours to the right and below; beyond the edge the pattern repeats.
+std::vector<std::uint32_t> quads(const ImageF& image) {
+  const int size = image.width();
+  const auto texel = [&](int x, int y) {
+    const float value = std::clamp(image.at(x & (size - 1), y & (size - 1)), 0.0F, 1.0F);
+    return static_cast<std::uint32_t>(value * 255.0F + 0.5F);
+  };
+  std::vector<std::uint32_t> result;
+  result.reserve(image.size());
+  for (int y = 0; y < size; ++y) {
+    for (int x = 0; x < size; ++x) {
+      result.push_back(texel(x, y) | texel(x + 1, y) << 8 | texel(x, y + 1) << 16 |
+                       texel(x + 1, y + 1) << 24);
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
 Texture::Texture(const ImageF& pattern) {
   ImageF image = pattern;
-  while (true) {
-    Level level;
-    level.size = image.width();
-    level.texels.reserve(image.size());
-    for (std::size_t i = 0; i < image.size(); ++i) {
-      const float value = std::clamp(image.data()[i], 0.0F, 1.0F);
-      level.texels.push_back(static_cast<std::uint8_t>(value * 255.0F + 0.5F));
-    }
-    levels_.push_back(std::move(level));
-    if (image.width() == 1) break;
+  levels_.push_back(quads(image));
+  while (image.width() > 1) {
     image = halved(image);
+    levels_.push_back(quads(image));
   }
   mean_ = std::clamp(image.at(0, 0), 0.0F, 1.0F);
 }

@@ -7,6 +7,18 @@
 
 namespace sovo::sim {
 
+/// A place on an endlessly repeated pattern, as fractions of its side in units of 2^-32: whole
+/// repetitions vanish by themselves.
+struct TexturePlace {
+  std::uint32_t u = 0;
+  std::uint32_t v = 0;
+};
+
+/// `x` sides as a fraction of the pattern's side. Precondition: |x| < 2^30.
+inline std::uint32_t texture_fraction(double x) {
+  return static_cast<std::uint32_t>(static_cast<std::int64_t>(x * 4294967296.0));
+}
+
 /// A square pattern of side 1 that repeats endlessly, with its means over ever larger blocks, so
 /// that it can be looked up at the resolution at which it is seen. Values are in [0, 1].
 class Texture {
@@ -15,61 +27,50 @@ class Texture {
   explicit Texture(const ImageF& pattern);
 
   /// Texels along the side.
-  int size() const { return levels_.front().size; }
+  int size() const { return 1 << (num_levels() - 1); }
+  int num_levels() const { return static_cast<int>(levels_.size()); }
+  float mean() const { return mean_; }
 
-  /// Value at (u, v), where one texel of the resolution looked up is 2^level / size() wide;
-  /// linear between texels and between levels.
-  float sample(double u, double v, float level) const {
-    const float fu = fraction(u);
-    const float fv = fraction(v);
-    if (level <= 0.0F) return bilinear(levels_.front(), fu, fv);
+  /// Value where one texel of the resolution looked up is 2^level / size() wide; linear between
+  /// texels (in steps of 1/256 of them) and between levels.
+  float sample(TexturePlace place, float level) const {
+    constexpr float kScale = 1.0F / (255.0F * 65536.0F);
+    if (level <= 0.0F) return kScale * static_cast<float>(bilinear(0, place));
     const int lower = static_cast<int>(level);
-    if (lower + 1 >= static_cast<int>(levels_.size())) return mean_;
+    if (lower + 1 >= num_levels()) return mean_;
     const float w = level - static_cast<float>(lower);
-    const float fine = bilinear(levels_[static_cast<std::size_t>(lower)], fu, fv);
-    const float coarse = bilinear(levels_[static_cast<std::size_t>(lower) + 1], fu, fv);
-    return fine + w * (coarse - fine);
+    const auto fine = static_cast<float>(bilinear(lower, place));
+    const auto coarse = static_cast<float>(bilinear(lower + 1, place));
+    return kScale * (fine + w * (coarse - fine));
   }
 
-  float mean() const { return mean_; }
-  int num_levels() const { return static_cast<int>(levels_.size()); }
+  /// As above, at fractions of the side.
+  float sample(double u, double v, float level) const {
+    return sample(TexturePlace{texture_fraction(u), texture_fraction(v)}, level);
+  }
 
  private:
-  struct Level {
-    int size = 0;
-    std::vector<std::uint8_t> texels;
-  };
-
-  static float fraction(double x) {
-    const auto whole = static_cast<std::int64_t>(x);
-    const auto f = static_cast<float>(x - static_cast<double>(whole));
-    return f < 0.0F ? f + 1.0F : f;
+  /// 255 * 65536 times the value.
+  int bilinear(int level, TexturePlace place) const {
+    const auto l = static_cast<std::size_t>(level);
+    const int bits = num_levels() - 1 - level;
+    // Texel centres are at half texels. 64 bits, so that a level of one texel can be shifted out.
+    const std::uint32_t half = static_cast<std::uint32_t>(std::uint64_t{1} << (31 - bits));
+    const std::uint64_t u = std::uint64_t{place.u - half} << bits;
+    const std::uint64_t v = std::uint64_t{place.v - half} << bits;
+    const std::uint32_t fu = static_cast<std::uint32_t>(u >> 24) & 255U;
+    const std::uint32_t fv = static_cast<std::uint32_t>(v >> 24) & 255U;
+    const std::uint32_t quad = levels_[l][(v >> 32 << bits) + (u >> 32)];
+    // The upper and the lower pair at once, in the two halves of a word.
+    const std::uint32_t left = quad & 0x00FF00FFU;
+    const std::uint32_t right = quad >> 8 & 0x00FF00FFU;
+    const std::uint32_t rows = left * (256U - fu) + right * fu;
+    return static_cast<int>((rows & 0xFFFFU) * (256U - fv) + (rows >> 16) * fv);
   }
 
-  static float bilinear(const Level& level, float u, float v) {
-    const auto size = static_cast<float>(level.size);
-    // One tile is added to keep the sum positive, so that truncation is the floor.
-    const float x = u * size + (size - 0.5F);
-    const float y = v * size + (size - 0.5F);
-    const int xi = static_cast<int>(x);
-    const int yi = static_cast<int>(y);
-    const float fx = x - static_cast<float>(xi);
-    const float fy = y - static_cast<float>(yi);
-    const int mask = level.size - 1;
-    const std::uint8_t* row0 = level.texels.data() + (yi & mask) * level.size;
-    const std::uint8_t* row1 = level.texels.data() + ((yi + 1) & mask) * level.size;
-    const int x0 = xi & mask;
-    const int x1 = (xi + 1) & mask;
-    const float a = static_cast<float>(row0[x0]);
-    const float b = static_cast<float>(row0[x1]);
-    const float c = static_cast<float>(row1[x0]);
-    const float d = static_cast<float>(row1[x1]);
-    const float top = a + fx * (b - a);
-    const float bottom = c + fx * (d - c);
-    return (top + fy * (bottom - top)) * (1.0F / 255.0F);
-  }
-
-  std::vector<Level> levels_;
+  /// Levels from the finest to one texel. Every entry has the texel, its right neighbour, and the
+  /// two below them, in this order from the lowest byte on.
+  std::vector<std::vector<std::uint32_t>> levels_;
   float mean_ = 0.0F;
 };
 

@@ -272,8 +272,7 @@ TrackingResult CoarseTracker::try_hypothesis(const TrackingReference& reference,
   result.view_ratio = static_cast<double>(last.in_view) /
                       static_cast<double>(std::max<std::size_t>(1, reference.levels[0].size()));
   result.information = last.H.topLeftCorner<6, 6>();
-  result.good =
-      last.in_view >= 30 && std::abs(result.affine.a - reference.affine.a) < kMaxLogGain;
+  result.good = last.in_view >= 30 && std::abs(result.affine.a - reference.affine.a) < kMaxLogGain;
   return result;
 }
 

@@ -217,10 +217,9 @@ int PointActivator::activate(Window* window) {
   }
   for (int h = 0; h < window->size(); ++h) {
     // In raster order neighbours in memory are neighbours in every target image.
-    std::stable_sort((*window)[h].points.begin(), (*window)[h].points.end(),
-                     [](const Point& a, const Point& b) {
-                       return a.v < b.v || (a.v == b.v && a.u < b.u);
-                     });
+    std::stable_sort(
+        (*window)[h].points.begin(), (*window)[h].points.end(),
+        [](const Point& a, const Point& b) { return a.v < b.v || (a.v == b.v && a.u < b.u); });
     std::erase_if((*window)[h].immature, [](const ImmaturePoint& p) { return p.type == 0; });
   }
   return activated;

@@ -72,7 +72,7 @@ struct Point {
   float relative_baseline = 0.0F;  ///< Largest baseline * rho of its good residuals.
   int good_residuals = 0;          ///< Inlier residuals on record, counted at every keyframe.
   bool remove = false;
-  bool in_snapshot = false;  ///< Was part of the last snapshot.
+  bool in_snapshot = false;                     ///< Was part of the last snapshot.
   std::array<Residual, kMaxSlots> residuals{};  ///< By target slot.
   /// States in the newest keyframe and the one before (for the rules of removal).
   ResidualState last_state = ResidualState::kAbsent;

@@ -42,7 +42,7 @@ TEST(ScaleFilter, AnUnambiguousColdStartLocks) {
   EXPECT_DOUBLE_EQ(update.log_scale_correction, 1.7);
   EXPECT_TRUE(filter.locked());
   EXPECT_FALSE(filter.wants_cold_start());
-  EXPECT_NEAR(filter.sigma(), 0.002, 1e-12);
+  EXPECT_NEAR(filter.sigma(), 0.002 * std::sqrt(ScaleFilterConfig().measurement_factor), 1e-12);
 }
 
 TEST(ScaleFilter, AmbiguousColdStartsLockWhenTwoAgree) {
@@ -58,7 +58,9 @@ TEST(ScaleFilter, AmbiguousColdStartsLockWhenTwoAgree) {
 }
 
 TEST(ScaleFilter, ConvergesToTheScale) {
-  ScaleFilter filter = locked_filter();
+  ScaleFilterConfig config;
+  config.measurement_factor = 1.0;
+  ScaleFilter filter = locked_filter(config);
   double error = 0.03;
   for (int i = 0; i < 10; ++i) error -= filter.update(measure(error, 0.003)).log_scale_correction;
   EXPECT_LT(std::abs(error), 1e-5);
@@ -216,6 +218,37 @@ TEST(ScaleFilter, SigmaCountsCorrelationOfSharedPoints) {
   EXPECT_LT(found.nees, 1.8);
   EXPECT_GT(found.path_nees, 0.4);
   EXPECT_LT(found.path_nees, 2.5);
+}
+
+/// The filter's errors over keyframes whose scale walks by `walk` and is measured with `noise`,
+/// while the optimizer claims 0.002.
+double rms_error(double walk, double noise, ScaleFilter* filter) {
+  std::mt19937 random(5);
+  double error = 0.0;
+  double sum = 0.0;
+  constexpr int kKeyframes = 400;
+  constexpr int kLearning = 100;
+  for (int i = 0; i < kKeyframes; ++i) {
+    error += walk * test::normal(random);
+    error -=
+        filter->update(measure(error + noise * test::normal(random), 0.002)).log_scale_correction;
+    if (i >= kLearning) sum += error * error;
+  }
+  return std::sqrt(sum / (kKeyframes - kLearning));
+}
+
+TEST(ScaleFilter, LearnsFromAlternatingInnovationsThatMeasurementsAreWorseThanClaimed) {
+  ScaleFilter filter = locked_filter();
+  // A steady scale under noise four times as large as claimed: most of it must be averaged out.
+  EXPECT_LT(rms_error(0.0003, 0.008, &filter), 0.4 * 0.008);
+  EXPECT_GT(filter.measurement_factor(), 8.0);
+}
+
+TEST(ScaleFilter, LearnsFromTrendingInnovationsThatTheScaleWalks) {
+  ScaleFilter filter = locked_filter();
+  // A walking scale, measured well: the correction must follow it, not lag.
+  EXPECT_LT(rms_error(0.008, 0.001, &filter), 0.5 * 0.008);
+  EXPECT_GT(filter.process_noise(), 3.0 * ScaleFilterConfig().process_noise);
 }
 
 TEST(ScaleFilter, LearnsTheProcessNoiseWithinBounds) {

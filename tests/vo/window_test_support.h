@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cmath>
+#include <map>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -139,20 +140,41 @@ inline std::vector<Point> scene_points(const SyntheticScene& scene, const Camera
   return points;
 }
 
+/// What a keyframe of the scene is made of.
+struct SceneView {
+  ImagePyramidPtr pyramid;
+  std::vector<Point> points;
+};
+
+/// The views of `n` keyframes, made once a program.
+inline const std::vector<SceneView>& scene_views(int n, int stride) {
+  static std::map<std::pair<int, int>, std::vector<SceneView>> made;
+  std::vector<SceneView>& views = made[{n, stride}];
+  if (!views.empty()) return views;
+  const SyntheticScene scene(3);
+  const CameraModel camera = small_camera();
+  std::vector<SE3> poses;
+  for (int i = 0; i < n; ++i) poses.push_back(keyframe_pose(i));
+  for (int i = 0; i < n; ++i) {
+    views.push_back({scene_view(scene, camera, poses[static_cast<std::size_t>(i)]), {}});
+    if (i + 1 == n) continue;
+    views.back().points =
+        scene_points(scene, camera, views.back().pyramid->level(0), poses, i, stride);
+  }
+  return views;
+}
+
 /// A window of `n` keyframes of the synthetic scene at their true poses; each but the newest hosts
 /// points at their true depths, with residuals into all others. The states of the residuals are
 /// those of the first linearization.
 inline Window scene_window(int n, int stride = 7, std::uint32_t first_id = 0) {
-  const SyntheticScene scene(3);
-  const CameraModel camera = small_camera();
-  Window window(camera);
-  std::vector<SE3> poses;
-  for (int i = 0; i < n; ++i) poses.push_back(keyframe_pose(i));
+  Window window(small_camera());
+  const std::vector<SceneView>& views = scene_views(n, stride);
   for (int i = 0; i < n; ++i) {
-    const SE3& pose = poses[static_cast<std::size_t>(i)];
-    Keyframe& k = window.insert(make_keyframe(first_id + static_cast<std::uint32_t>(i),
-                                              scene_view(scene, camera, pose), pose));
-    if (i + 1 < n) k.points = scene_points(scene, camera, k.image(), poses, i, stride);
+    const SceneView& view = views[static_cast<std::size_t>(i)];
+    Keyframe& k = window.insert(
+        make_keyframe(first_id + static_cast<std::uint32_t>(i), view.pyramid, keyframe_pose(i)));
+    k.points = view.points;
   }
   for (int h = 0; h < n; ++h) {
     for (Point& p : window[h].points) {

@@ -26,8 +26,8 @@ struct Layer {
   /// Tiles of the pattern per metre of the surface: (u, v) = map * (x, y) + velocity * t.
   std::array<double, 4> map{1.0, 0.0, 0.0, 1.0};
   std::array<double, 2> velocity{0.0, 0.0};  ///< [tiles/s]
-  bool world = false;       ///< (x, y) are the world's, not the surface's own.
-  float log_texels = 0.0F;  ///< log2 of texels per metre; set with the material.
+  bool world = false;                        ///< (x, y) are the world's, not the surface's own.
+  float log_texels = 0.0F;                   ///< log2 of texels per metre; set with the material.
 };
 
 struct Material {

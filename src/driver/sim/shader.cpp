@@ -9,7 +9,7 @@ namespace sovo::sim {
 
 namespace {
 
-constexpr int kMaxProbes = 4;
+constexpr int kMaxProbes = 3;
 /// Patterns are looked up a little softer than pixels are, as a lens does.
 constexpr float kLevelBias = 0.25F;
 

@@ -29,7 +29,7 @@ PoolMaterials make_materials(SceneBuilder& b, std::uint64_t seed) {
                        layer(stains, 1.37, Blend::kMultiply, 0.5F, 2.0)};
     return b.material(material);
   };
-  m.floor = tiled(0.56F, 0.75F);
+  m.floor = tiled(0.56F, 0.95F);
   m.wall = tiled(0.5F, 0.7F);
   m.line = tiled(0.12F, 0.22F);
   Material water;
@@ -123,7 +123,7 @@ Scene build_pool(const Motion& motion, std::uint64_t seed) {
   scene.exposure_s = 0.006;
   const PoolMaterials m = make_materials(b, combine(seed, 21));
   scene.caustics = b.texture(caustic_pattern(512, 100, combine(seed, 22)));
-  scene.caustic_strength = 0.35F;
+  scene.caustic_strength = 0.12F;
   scene.haze = 0.14;
   scene.haze_colour = 0.34F;
   scene.sky = {0.34F, 0.34F, -1, -1, 0.0F};

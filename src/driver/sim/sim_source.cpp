@@ -1,0 +1,264 @@
+#include "sovo/driver/sim/sim_source.h"
+
+#include <algorithm>
+#include <cmath>
+#include <future>
+#include <thread>
+#include <utility>
+
+#include "sovo/driver/sim/random.h"
+
+namespace sovo::sim {
+namespace {
+
+constexpr std::uint8_t kHostClock = 0;
+
+std::int64_t utc_now_ns() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
+}
+
+/// Pairs of the trajectory that the configuration asks for and that are not dropped.
+std::vector<std::size_t> choose_pairs(const SimConfig& config, const Motion& motion, double rate) {
+  const double span = std::max(0.0, motion.duration_s() - config.start_s);
+  auto count = static_cast<std::size_t>(std::floor(span * rate + 1e-6)) + 1;
+  if (config.frames > 0) count = std::min(count, static_cast<std::size_t>(config.frames));
+  std::vector<std::size_t> pairs;
+  for (std::size_t i = 0; i < count; ++i) {
+    // The first pair is never dropped.
+    const bool dropped = i > 0 && unit(combine(config.seed + 77, i)) < config.sensor.drop_rate;
+    if (!dropped) pairs.push_back(i);
+  }
+  return pairs;
+}
+
+/// Velocity of the camera in its own frame: linear, angular.
+Vec6 velocity_of(const SE3& before, const SE3& after, double dt) {
+  Vec6 velocity;
+  velocity.head<3>() =
+      before.rotation().inverse() * (after.translation() - before.translation()) / dt;
+  velocity.tail<3>() = (before.rotation().inverse() * after.rotation()).log() / dt;
+  return velocity;
+}
+
+Result<void> check(const SimConfig& config) {
+  const SensorConfig& s = config.sensor;
+  if (config.frames < 0) return Error{"frames must not be negative"};
+  if (config.frame_rate < 0.0 || config.frame_rate > 1000.0) {
+    return Error{"frame_rate must be at most 1000 Hz, or 0 for the world's own"};
+  }
+  if (config.start_s < 0.0) return Error{"start_s must not be negative"};
+  if (s.vignette < 0.0 || s.vignette > 0.9) return Error{"sensor.vignette must be in [0, 0.9]"};
+  if (!(s.response_gamma >= 0.2 && s.response_gamma <= 5.0)) {
+    return Error{"sensor.response_gamma must be in [0.2, 5]"};
+  }
+  if (s.drop_rate < 0.0 || s.drop_rate > 0.95)
+    return Error{"sensor.drop_rate must be in [0, 0.95]"};
+  if (!(s.max_exposure_ms > 0.0)) return Error{"sensor.max_exposure_ms must be positive"};
+  if (s.read_noise < 0.0 || s.shot_noise < 0.0) return Error{"noise must not be negative"};
+  return {};
+}
+
+}  // namespace
+
+SimSource::SimSource(const SimConfig& config, Calibration calibration, Motion motion)
+    : config_(config),
+      calibration_(std::move(calibration)),
+      motion_(std::move(motion)),
+      scene_(build_scene(config.world, motion_, config.seed)),
+      frame_rate_(config.frame_rate > 0.0 ? config.frame_rate : own_frame_rate(config.world)),
+      delivered_(choose_pairs(config, motion_, frame_rate_)),
+      left_(scene_, calibration_.rig.left),
+      right_(scene_, calibration_.rig.right),
+      truth_(scene_, calibration_.rig.left),
+      left_sensor_(config.sensor, calibration_.rig.left.width, calibration_.rig.left.height),
+      right_sensor_(config.sensor, calibration_.rig.right.width, calibration_.rig.right.height),
+      left_exposure_(config.sensor, scene_.exposure_s),
+      right_exposure_(config.sensor, scene_.exposure_s) {
+  calibration_.left_photometric = left_sensor_.photometric();
+  calibration_.right_photometric = right_sensor_.photometric();
+  if (config.restamp) shift_ns_ = utc_now_ns() - stamp_of(0);
+  decoder_ = std::make_unique<FrameDecoder>(delivered_.size(),
+                                            [this](std::size_t n) { return render(n); });
+}
+
+/// Time since the first pair [s].
+double SimSource::time_of(std::size_t index) const {
+  return static_cast<double>(index) / frame_rate_;
+}
+
+std::int64_t SimSource::stamp_of(std::size_t index) const {
+  const double t = config_.start_s + time_of(index);
+  return motion_.first_ns() + static_cast<std::int64_t>(std::llround(1e9 * t));
+}
+
+/// Time on the trajectory at a stamp that was not shifted [s].
+double SimSource::world_time(std::int64_t stamp_ns) const {
+  const double t = 1e-9 * static_cast<double>(stamp_ns - motion_.first_ns());
+  return config_.reverse ? motion_.duration_s() - t : t;
+}
+
+SE3 SimSource::pose_at(std::int64_t stamp_ns) const {
+  return motion_.at(world_time(stamp_ns - shift_ns_));
+}
+
+std::int64_t SimSource::original_stamp(std::int64_t fed) const {
+  const std::int64_t stamp = fed - shift_ns_;
+  return config_.reverse ? motion_.first_ns() + motion_.last_ns() - stamp : stamp;
+}
+
+Trajectory SimSource::truth() const {
+  Trajectory poses;
+  for (const std::size_t index : delivered_) {
+    const std::int64_t stamp = stamp_of(index) + shift_ns_;
+    poses.push_back({stamp, pose_at(stamp)});
+  }
+  return poses;
+}
+
+SideImage SimSource::make_side(Side which, double t, std::uint64_t frame, Renderer* renderer,
+                               ExposureControl* exposure, const Sensor& sensor) const {
+  const SE3 T_left_camera = which == Side::kLeft ? SE3() : calibration_.rig.T_right_left.inverse();
+  const double along = config_.reverse ? -1.0 : 1.0;
+  const auto pose = [&](double time) { return motion_.at(time) * T_left_camera; };
+  RenderedImage image;
+  renderer->render(pose(t), t, &image);
+  if (!settled_) exposure->settle(image.light);
+  ImageF blurred;
+  if (config_.sensor.motion_blur) {
+    constexpr double h = 2e-3;
+    const Vec6 velocity = along * velocity_of(pose(t - h), pose(t + h), 2.0 * h);
+    blur_by_motion(renderer->rays(), image, velocity, exposure->exposure_s(), &blurred);
+  }
+  const double since = time_of(frame);
+  const bool dark = config_.sensor.dark == which && since >= config_.sensor.dark_from_s &&
+                    since < config_.sensor.dark_until_s;
+  const std::uint64_t seed =
+      combine(combine(config_.seed, frame), which == Side::kLeft ? 101U : 202U);
+  const ImageF& light = config_.sensor.motion_blur ? blurred : image.light;
+  SideImage side;
+  side.valid = true;
+  side.width = light.width();
+  side.height = light.height();
+  side.step = light.width();
+  side.data = std::make_shared<const std::vector<std::uint8_t>>(
+      sensor.expose(light, *exposure, dark, seed));
+  side.exposure_s = static_cast<float>(exposure->exposure_s());
+  side.gain_db = static_cast<float>(exposure->gain_db());
+  return side;
+}
+
+SourceResult SimSource::render(std::size_t n) {
+  const std::size_t index = delivered_[n];
+  const std::int64_t stamp = stamp_of(index);
+  const double t = world_time(stamp);
+  const double offset_s = 1e-3 * config_.sensor.right_offset_ms;
+  SourceResult result;
+  result.state = SourceState::kFrame;
+  StereoFrame& frame = result.frame;
+  frame.stamp_ns = stamp + shift_ns_;
+  frame.sequence = index;
+  frame.clock = kHostClock;
+  frame.pair_error_s = std::abs(offset_s);
+  frame.frame_id = config_.frame_id;
+  const auto left = [&] {
+    return make_side(Side::kLeft, t, index, &left_, &left_exposure_, left_sensor_);
+  };
+  const auto right = [&] {
+    const double later = config_.reverse ? t - offset_s : t + offset_s;
+    return make_side(Side::kRight, later, index, &right_, &right_exposure_, right_sensor_);
+  };
+  // With one exposure for both, the first pair must know the left one's before the right is taken.
+  const bool at_once = config_.threads > 1 && (settled_ || !config_.sensor.shared_exposure);
+  if (at_once) {
+    auto other = std::async(std::launch::async, right);
+    frame.left = left();
+    frame.right = other.get();
+  } else {
+    frame.left = left();
+    if (config_.sensor.shared_exposure) {
+      right_exposure_ = left_exposure_;
+      settled_ = true;
+    }
+    frame.right = right();
+  }
+  settled_ = true;
+  frame.right.stamp_offset_ns = static_cast<std::int64_t>(std::llround(1e9 * offset_s));
+  left_exposure_.observe(*frame.left.data);
+  right_exposure_.observe(*frame.right.data);
+  if (config_.sensor.shared_exposure) right_exposure_ = left_exposure_;
+  return result;
+}
+
+SourceResult SimSource::next(std::chrono::milliseconds timeout) {
+  constexpr std::chrono::milliseconds kLongest = std::chrono::hours(24);
+  const auto deadline = std::chrono::steady_clock::now() + std::min(timeout, kLongest);
+  if (!waiting_) {
+    SourceResult result = decoder_->next(deadline);
+    if (result.state != SourceState::kFrame) return result;
+    waiting_ = std::move(result);
+  }
+  if (config_.real_time) {
+    const auto since = std::chrono::nanoseconds(waiting_->frame.stamp_ns - shift_ns_ - stamp_of(0));
+    if (!std::exchange(begun_, true)) start_ = std::chrono::steady_clock::now() - since;
+    const auto due = start_ + since;
+    std::this_thread::sleep_until(std::min(due, deadline));
+    if (deadline < due) return {};
+  }
+  SourceResult result = std::move(*waiting_);
+  waiting_.reset();
+  return result;
+}
+
+ImageF SimSource::depth_at(std::int64_t stamp_ns) {
+  RenderedImage image;
+  const double t = world_time(stamp_ns - shift_ns_);
+  truth_.render(motion_.at(t), t, &image);
+  ImageF depth(image.range.width(), image.range.height());
+  for (int y = 0; y < depth.height(); ++y) {
+    for (int x = 0; x < depth.width(); ++x) {
+      const float range = image.range.at(x, y);
+      depth.at(x, y) = std::isfinite(range) ? range * truth_.rays().ray(x, y).z() : 0.0F;
+    }
+  }
+  return depth;
+}
+
+std::vector<float> SimSource::depth_at(std::int64_t stamp_ns, const std::vector<Vec2>& pixels) {
+  RenderedImage image;
+  const double t = world_time(stamp_ns - shift_ns_);
+  truth_.render(motion_.at(t), t, &image);
+  std::vector<float> depths;
+  for (const Vec2& pixel : pixels) {
+    const auto ray = calibration_.rig.left.unproject(pixel);
+    const float range = truth_.range_at(pixel);
+    const bool seen = ray && std::isfinite(range);
+    depths.push_back(seen ? range * static_cast<float>(ray->z()) : 0.0F);
+  }
+  return depths;
+}
+
+Result<std::unique_ptr<SimSource>> open_sim(const SimConfig& config) {
+  if (const auto valid = check(config); !valid) return valid.failure();
+  Calibration calibration;
+  calibration.rig = own_rig(config.world);
+  calibration.format = "simulated";
+  if (!config.calibration.empty()) {
+    auto loaded = load_calibration(config.calibration);
+    if (!loaded) return loaded.failure();
+    calibration = std::move(*loaded);
+    const StereoRig& rig = calibration.rig;
+    if (rig.left.width < 16 || rig.left.height < 16 || rig.right.width < 16 ||
+        rig.right.height < 16) {
+      return Error{config.calibration + ": has no image size; give a calibration that has one"};
+    }
+  }
+  if (config.trajectory.empty()) {
+    return std::make_unique<SimSource>(config, calibration, own_motion(config.world));
+  }
+  auto motion = load_motion(config, calibration.rig);
+  if (!motion) return motion.failure();
+  return std::make_unique<SimSource>(config, std::move(calibration), std::move(*motion));
+}
+
+}  // namespace sovo::sim

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <ranges>
 
 #include "sovo/io/text.h"
 
@@ -43,14 +44,15 @@ struct Frame {
 std::string escape(const std::string& text) {
   std::string out;
   for (const char c : text) {
-    if (c == '&')
+    if (c == '&') {
       out += "&amp;";
-    else if (c == '<')
+    } else if (c == '<') {
       out += "&lt;";
-    else if (c == '>')
+    } else if (c == '>') {
       out += "&gt;";
-    else
+    } else {
       out += c;
+    }
   }
   return out;
 }
@@ -159,13 +161,13 @@ std::string draw_series(const ChartSeries& series, const Frame& f) {
 std::string draw_legend(const Chart& chart, const Frame& f) {
   std::string out;
   double x = f.x + f.width;
-  for (auto it = chart.series.rbegin(); it != chart.series.rend(); ++it) {
-    if (it->name.empty()) continue;
-    x -= 7.0 * static_cast<double>(it->name.size()) + 4.0;
-    out += text_at(x, f.y - 12, "class=\"tick\"", it->name);
+  for (const auto& series : std::views::reverse(chart.series)) {
+    if (series.name.empty()) continue;
+    x -= 7.0 * static_cast<double>(series.name.size()) + 4.0;
+    out += text_at(x, f.y - 12, "class=\"tick\"", series.name);
     out += line_at(x - 26, f.y - 16, x - 6, f.y - 16,
-                   "class=\"line\" stroke=\"" + it->colour + "\"" +
-                       (it->dashed ? " stroke-dasharray=\"6 4\"" : ""));
+                   "class=\"line\" stroke=\"" + series.colour + "\"" +
+                       (series.dashed ? " stroke-dasharray=\"6 4\"" : ""));
     x -= 40.0;
   }
   return out;

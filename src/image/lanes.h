@@ -9,7 +9,6 @@ namespace sovo {
 /// Four floats that the compiler keeps in one register (SSE, NEON): GCC's vector extension, so
 /// that one source serves every machine and each lane computes exactly what scalar code would.
 using Lane = float __attribute__((vector_size(16)));
-using LaneMask = int __attribute__((vector_size(16)));
 inline constexpr std::size_t kLanes = 4;
 
 inline Lane load_lane(const float* p) {
@@ -24,14 +23,14 @@ inline float sum_lane(Lane v) { return (v[0] + v[1]) + (v[2] + v[3]); }
 
 /// Rows become columns.
 inline void transpose(Lane* a, Lane* b, Lane* c, Lane* d) {
-  const Lane ab_low = __builtin_shuffle(*a, *b, LaneMask{0, 4, 1, 5});
-  const Lane ab_high = __builtin_shuffle(*a, *b, LaneMask{2, 6, 3, 7});
-  const Lane cd_low = __builtin_shuffle(*c, *d, LaneMask{0, 4, 1, 5});
-  const Lane cd_high = __builtin_shuffle(*c, *d, LaneMask{2, 6, 3, 7});
-  *a = __builtin_shuffle(ab_low, cd_low, LaneMask{0, 1, 4, 5});
-  *b = __builtin_shuffle(ab_low, cd_low, LaneMask{2, 3, 6, 7});
-  *c = __builtin_shuffle(ab_high, cd_high, LaneMask{0, 1, 4, 5});
-  *d = __builtin_shuffle(ab_high, cd_high, LaneMask{2, 3, 6, 7});
+  const Lane ab_low = __builtin_shufflevector(*a, *b, 0, 4, 1, 5);
+  const Lane ab_high = __builtin_shufflevector(*a, *b, 2, 6, 3, 7);
+  const Lane cd_low = __builtin_shufflevector(*c, *d, 0, 4, 1, 5);
+  const Lane cd_high = __builtin_shufflevector(*c, *d, 2, 6, 3, 7);
+  *a = __builtin_shufflevector(ab_low, cd_low, 0, 1, 4, 5);
+  *b = __builtin_shufflevector(ab_low, cd_low, 2, 3, 6, 7);
+  *c = __builtin_shufflevector(ab_high, cd_high, 0, 1, 4, 5);
+  *d = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
 }
 
 /// Values and gradients of an image at four positions [grey levels, grey levels / px].

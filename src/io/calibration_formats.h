@@ -35,7 +35,7 @@ Calibration parse_kitti(const std::string& text, const std::string& path,
 Calibration parse_euroc(const std::string& mav_folder);
 Calibration parse_kalibr(const YamlField& root);
 Calibration parse_opencv(const YamlField& root, const CalibrationOptions& options);
-Calibration parse_ros(const YamlField& left, const CalibrationOptions& options);
+Calibration parse_ros(const YamlField& root, const CalibrationOptions& options);
 
 /// Reads a YAML file; OpenCV's FileStorage header is skipped.
 YamlField read_yaml_file(const std::string& path);

@@ -23,7 +23,7 @@ class FormatError : public std::runtime_error {
 /// and is not there, or is of another type, throws a `FormatError`.
 class YamlField {
  public:
-  YamlField(std::string file, YAML::Node node) : file_(std::move(file)), node_(std::move(node)) {}
+  YamlField(std::string file, const YAML::Node& node) : file_(std::move(file)), node_(node) {}
 
   const std::string& file() const { return file_; }
   bool is_map() const { return node_.IsMap(); }
@@ -49,8 +49,8 @@ class YamlField {
   FormatError error(const std::string& what) const;
 
  private:
-  YamlField(std::string file, YAML::Node node, std::string path)
-      : file_(std::move(file)), node_(std::move(node)), path_(std::move(path)) {}
+  YamlField(std::string file, const YAML::Node& node, std::string path)
+      : file_(std::move(file)), node_(node), path_(std::move(path)) {}
 
   std::string file_;
   YAML::Node node_;

@@ -1,8 +1,7 @@
 #include "sovo/vo/bundle_adjustment.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/QR>
-#include <Eigen/SVD>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -15,6 +14,24 @@ namespace {
 // Of the first keyframe: it is the world.
 constexpr double kGaugePose = 1e11;
 constexpr double kGaugeBrightness = 1e10;
+
+/// Orthonormal basis of the span of at most seven columns; nearly dependent ones add nothing.
+MatX orthonormalized(MatX n) {
+  for (Eigen::Index c = 0; c < n.cols(); ++c) {
+    const double norm = n.col(c).norm();
+    if (norm > 1e-12) n.col(c) /= norm;
+  }
+  using Gram = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 7, 7>;
+  const Gram gram = n.transpose() * n;
+  const Eigen::SelfAdjointEigenSolver<Gram> eigen(gram);
+  const auto& values = eigen.eigenvalues();  // ascending
+  constexpr double kCut = 1e-10;             // of squared lengths
+  Eigen::Index first = 0;
+  while (first < values.size() && values[first] <= kCut * values[values.size() - 1]) ++first;
+  const Eigen::Index rank = values.size() - first;
+  return n * eigen.eigenvectors().rightCols(rank) *
+         values.tail(rank).cwiseSqrt().cwiseInverse().asDiagonal();
+}
 
 void backup(Window* window, const std::vector<PointRef>& points) {
   for (int i = 0; i < window->size(); ++i) (*window)[i].x_backup = (*window)[i].x;
@@ -135,15 +152,18 @@ MatX BundleAdjuster::gauge_basis(const Window& window, const VecX& units) {
     n.block<3, 1>(8 * i, 6) = T.translation();
   }
   n = units.cwiseInverse().asDiagonal() * n;
-  for (Eigen::Index c = 0; c < n.cols(); ++c) {
-    const double norm = n.col(c).norm();
-    if (norm > 1e-12) n.col(c) /= norm;
+  return orthonormalized(n);
+}
+
+MatX BundleAdjuster::removable_gauge(const Window& window, const VecX& units) {
+  if (window[0].id != 0) return gauge_basis(window, units);
+  // The first keyframe's prior holds the pose: what is left is scale about its camera centre.
+  const Vec3 centre = window[0].frozen_T_camera_world.inverse().translation();
+  MatX n = MatX::Zero(8 * window.size(), 1);
+  for (int i = 1; i < window.size(); ++i) {
+    n.block<3, 1>(8 * i, 0) = window[i].frozen_T_camera_world * centre;
   }
-  const Eigen::JacobiSVD<MatX> svd(n, Eigen::ComputeThinU);
-  const VecX& s = svd.singularValues();
-  Eigen::Index rank = 0;
-  while (rank < s.size() && s[rank] > 1e-5 * s[0]) ++rank;
-  return svd.matrixU().leftCols(rank);
+  return orthonormalized(units.cwiseInverse().asDiagonal() * n);
 }
 
 VecX BundleAdjuster::solve(const Window& window, const NormalEquations& system, double lambda,
@@ -166,7 +186,7 @@ VecX BundleAdjuster::solve(const Window& window, const NormalEquations& system, 
   const MatX balanced = balance.asDiagonal() * H * balance.asDiagonal();
   VecX y = -(balance.cwiseProduct(balanced.ldlt().solve(balance.cwiseProduct(b))));
   if (remove_gauge) {
-    const MatX basis = gauge_basis(window, units);
+    const MatX basis = removable_gauge(window, units);
     y -= basis * (basis.transpose() * y);
   }
   return units.cwiseProduct(y);

@@ -49,6 +49,10 @@ class BundleAdjuster {
   /// linearization points, in states divided by `state_units`.
   static MatX gauge_basis(const Window& window, const VecX& state_units);
 
+  /// The directions that a step may lose: all gauge directions, or, while the first keyframe with
+  /// its prior is in the window, scale about its centre alone.
+  static MatX removable_gauge(const Window& window, const VecX& state_units);
+
   /// Units that make the states comparable: translation half the mean depth, rotation 1, a 10,
   /// b 1000.
   static VecX state_units(const Window& window);

@@ -44,6 +44,18 @@ void spill(Accumulator* sums, std::array<double, 45>* total) {
   }
 }
 
+/// Levenberg-Marquardt step in states divided by `units`; a small damping extrapolates it.
+Vec8 damped_step(Mat8 H, const Vec8& gradient, const Vec8& prior, const Vec8& units,
+                 double lambda) {
+  H.diagonal() += prior;
+  H = units.asDiagonal() * H * units.asDiagonal();
+  H.diagonal() *= 1.0 + lambda;
+  Vec8 step = -H.ldlt().solve(units.cwiseProduct(gradient));
+  if (lambda < kExtrapolationLimit) step *= std::sqrt(std::sqrt(kExtrapolationLimit / lambda));
+  if (!step.allFinite()) step.setZero();
+  return step;
+}
+
 /// Units that make the eight unknowns comparable in the stop test.
 Vec8 tracker_units(double mean_rho) {
   Vec8 s;
@@ -56,6 +68,13 @@ Vec8 tracker_units(double mean_rho) {
 void CoarseTracker::Warped::reserve(std::size_t size) {
   for (auto* v : {&x, &y, &rho, &gx, &gy, &residual, &weight, &colour}) {
     if (v->size() < size) v->resize(size);
+  }
+}
+
+void CoarseTracker::Warped::finish(std::size_t size) {
+  n = size;
+  for (auto* v : {&x, &y, &rho, &gx, &gy, &residual, &weight, &colour}) {
+    std::fill_n(v->begin() + static_cast<std::ptrdiff_t>(n), kLanes, 0.0F);
   }
 }
 
@@ -110,13 +129,7 @@ double CoarseTracker::residuals(const ReferenceLevel& level, const ImageF& image
     warped_.colour[n] = level.colour[i];
     ++n;
   }
-  warped_.n = n;
-  for (std::size_t i = n; i < n + kLanes; ++i) {  // whole lanes for the normal equations
-    for (auto* a : {&warped_.x, &warped_.y, &warped_.rho, &warped_.gx, &warped_.gy,
-                    &warped_.residual, &warped_.weight, &warped_.colour}) {
-      (*a)[i] = 0.0F;
-    }
-  }
+  warped_.finish(n);
   out->in_view = in_view;
   out->inliers = static_cast<int>(n);
   out->saturated = in_view > 0 ? 1.0 - static_cast<double>(n) / in_view : 1.0;
@@ -188,10 +201,14 @@ CoarseTracker::LevelOutcome CoarseTracker::align_level(const TrackingReference& 
   Vec8 prior = Vec8::Zero();
   prior[6] = config_.brightness_prior_a;
   prior[7] = config_.brightness_prior_b;
+  const auto prior_error = [&](const Affine& a) {
+    Vec8 error = Vec8::Zero();
+    error[6] = a.a - reference.affine.a;
+    error[7] = a.b - reference.affine.b;
+    return error;
+  };
   const auto prior_energy = [&](const Affine& a, int in_view) {
-    const double da = a.a - reference.affine.a;
-    const double db = a.b - reference.affine.b;
-    return (prior[6] * da * da + prior[7] * db * db) / std::max(1, in_view);
+    return prior.dot(prior_error(a).cwiseAbs2()) / std::max(1, in_view);
   };
 
   LevelOutcome out;
@@ -206,17 +223,8 @@ CoarseTracker::LevelOutcome CoarseTracker::align_level(const TrackingReference& 
 
   double lambda = kStartLambda;
   for (int it = 0; it < kMaxIterations[static_cast<std::size_t>(std::min(level, 5))]; ++it) {
-    Mat8 H = now.H;
-    Vec8 b = now.b;
-    H.diagonal() += prior;
-    b[6] += prior[6] * (affine->a - reference.affine.a);
-    b[7] += prior[7] * (affine->b - reference.affine.b);
-    H = units.asDiagonal() * H * units.asDiagonal();
-    b = units.cwiseProduct(b);
-    H.diagonal() *= 1.0 + lambda;
-    Vec8 step = -H.ldlt().solve(b);
-    if (lambda < kExtrapolationLimit) step *= std::sqrt(std::sqrt(kExtrapolationLimit / lambda));
-    if (!step.allFinite()) step.setZero();
+    const Vec8 gradient = now.b + prior.cwiseProduct(prior_error(*affine));
+    const Vec8 step = damped_step(now.H, gradient, prior, units, lambda);
     const Vec8 x = units.cwiseProduct(step);
 
     const SE3 new_T = SE3::exp(x.head<6>()) * *T;

@@ -78,6 +78,8 @@ class CoarseTracker {
     AlignedVector<float> x, y, rho, gx, gy, residual, weight, colour;
     std::size_t n = 0;
     void reserve(std::size_t size);
+    /// Sets the number of inliers and clears one lane behind them: whole lanes are summed.
+    void finish(std::size_t size);
   };
   Warped warped_;
 };

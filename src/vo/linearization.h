@@ -24,8 +24,8 @@ void accumulate_relative(const Residual& residual, Mat8* H, Vec8* b);
 /// Adds the part of a residual to a point's own H_rho_rho and b_rho.
 void accumulate_depth(const Residual& residual, double* hessian, double* gradient);
 
-/// r - J x for the displacement `relative` (8) and `rho_delta`: changes `gram_r` so that later
+/// r - J x for the displacement `x` (8, relative) and `rho_delta`: changes `gram_r` so that later
 /// accumulation sees the residual as it would be at the linearization point.
-void shift_residual(const Vec8& relative, double rho_delta, Residual* residual);
+void shift_residual(const Vec8& x, double rho_delta, Residual* residual);
 
 }  // namespace sovo

@@ -43,7 +43,7 @@ struct ScaleOptimizerConfig {
   double min_log_scale = -5.0;  ///< Cold-start grid.
   double max_log_scale = 5.0;
   double tracking_log_range = 0.5;   ///< Largest log-scale found without cold start.
-  double sigma_intensity = 5.0;      ///< Noise of a grey-level difference.
+  double sigma_intensity = 10.0;     ///< Noise of a grey-level difference between two cameras.
   double student_nu = 5.0;           ///< Degrees of freedom of the robust weight.
   double min_disparity_px = 0.75;    ///< Points with less are left out.
   double min_relative_sigma = 0.01;  ///< Floor of sigma/inverse depth: caps a near point's say.

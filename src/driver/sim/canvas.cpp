@@ -43,7 +43,9 @@ void Canvas::stroke(const Stroke& k) {
       const double px = x + 0.5 - k.x0 * s;
       const double py = y + 0.5 - k.y0 * s;
       const double along = std::clamp((px * dx + py * dy) / length_squared, 0.0, 1.0);
-      const double distance = std::hypot(px - along * dx, py - along * dy);
+      const double ex = px - along * dx;
+      const double ey = py - along * dy;
+      const double distance = std::sqrt(ex * ex + ey * ey);
       const double half = 0.5 * s * (k.w0 + along * (k.w1 - k.w0));
       const double opacity = std::clamp(half - distance + 0.5, 0.0, 1.0);
       if (opacity <= 0.0) continue;

@@ -1,0 +1,283 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "sovo/driver/dataset/dataset_source.h"
+#include "sovo/driver/sim/sim_export.h"
+#include "sovo/driver/sim/sim_source.h"
+#include "support/cameras.h"
+
+namespace sovo::sim {
+namespace {
+
+/// Small cameras of one model, the right one different and turned.
+StereoRig small_rig(Distortion distortion) {
+  StereoRig rig;
+  rig.name = "small";
+  const bool fisheye = distortion == Distortion::kEquidistant;
+  const double f = fisheye ? 62.0 : 95.0;
+  switch (distortion) {
+    case Distortion::kNone:
+      rig.left = test::make_camera(160, 112, f, f, 79.5, 55.5);
+      rig.right = test::make_camera(160, 112, f + 1, f, 81.0, 54.0);
+      break;
+    case Distortion::kRadtan:
+      rig.left =
+          test::make_camera(160, 112, f, f, 79.0, 56.0, distortion, {-0.28, 0.07, 2e-4, 2e-5});
+      rig.right =
+          test::make_camera(160, 112, f, f + 1, 80.0, 57.0, distortion, {-0.27, 0.07, 1e-4, 0});
+      break;
+    case Distortion::kEquidistant:
+      rig.left =
+          test::make_camera(160, 112, f, f, 79.0, 56.0, distortion, {0.01, -0.01, 0.006, -0.0017});
+      rig.right =
+          test::make_camera(160, 112, f, f, 81.0, 55.0, distortion, {0.013, -0.015, 0.009, -0.002});
+      break;
+  }
+  rig.T_right_left = SE3(SO3::exp({0.006, -0.008, 0.004}), Vec3(-0.12, 0.002, 0.003));
+  return rig;
+}
+
+SimConfig quiet(World world) {
+  SimConfig config;
+  config.world = world;
+  config.frames = 2;
+  config.sensor.motion_blur = false;
+  config.sensor.vignette = 0.0;
+  return config;
+}
+
+SimSource make_source(const SimConfig& config, const StereoRig& rig) {
+  Calibration calibration;
+  calibration.rig = rig;
+  return SimSource(config, calibration, own_motion(config.world));
+}
+
+StereoFrame first_frame(SimSource& source) {
+  const SourceResult result = source.next(std::chrono::seconds(60));
+  EXPECT_EQ(result.state, SourceState::kFrame) << result.message;
+  return result.frame;
+}
+
+double sample(const SideImage& image, const Vec2& p) {
+  const int x = static_cast<int>(std::floor(p.x()));
+  const int y = static_cast<int>(std::floor(p.y()));
+  const double fx = p.x() - x;
+  const double fy = p.y() - y;
+  const auto at = [&](int i, int j) {
+    return static_cast<double>((*image.data)[static_cast<std::size_t>(j * image.step + i)]);
+  };
+  return (1 - fy) * ((1 - fx) * at(x, y) + fx * at(x + 1, y)) +
+         fy * ((1 - fx) * at(x, y + 1) + fx * at(x + 1, y + 1));
+}
+
+struct Residuals {
+  std::vector<double> absolute;  ///< Sorted.
+  double contrast = 0.0;         ///< Mean absolute difference of neighbouring pixels.
+
+  double quantile(double q) const {
+    return absolute[static_cast<std::size_t>(q * static_cast<double>(absolute.size() - 1))];
+  }
+};
+
+/// A pair with its truth.
+struct Pair {
+  StereoRig rig;
+  SideImage left;
+  SideImage right;
+  ImageF range;
+};
+
+SideImage take(const ImageF& light, const ExposureControl& exposure, std::uint64_t seed) {
+  SensorConfig config;
+  config.vignette = 0.0;
+  SideImage side;
+  side.step = light.width();
+  side.data = std::make_shared<const std::vector<std::uint8_t>>(
+      Sensor(config, light.width(), light.height()).expose(light, exposure, false, seed));
+  return side;
+}
+
+/// Compares left pixels with where the truth, its depth multiplied by `factor`, puts them into the
+/// right image.
+Residuals warp(const Pair& pair, double factor) {
+  const StereoRig& rig = pair.rig;
+  Residuals residuals;
+  for (int y = 3; y < rig.left.height - 3; ++y) {
+    for (int x = 3; x < rig.left.width - 3; ++x) {
+      const double range = double{pair.range.at(x, y)} * factor;
+      const auto ray = rig.left.unproject({x, y});
+      if (!ray || !std::isfinite(range)) continue;
+      const auto pixel = rig.right.project(rig.T_right_left * Vec3(*ray * range));
+      if (!pixel || !rig.right.contains(*pixel, 2.0)) continue;
+      const double here = sample(pair.left, Vec2(x, y));
+      residuals.absolute.push_back(std::abs(sample(pair.right, *pixel) - here));
+      residuals.contrast += std::abs(sample(pair.left, Vec2(x + 1, y)) - here);
+    }
+  }
+  residuals.contrast /= static_cast<double>(residuals.absolute.size());
+  std::sort(residuals.absolute.begin(), residuals.absolute.end());
+  return residuals;
+}
+
+class WarpTest : public ::testing::TestWithParam<World> {};
+
+TEST_P(WarpTest, TruthCarriesLeftIntoRightThroughAnyCamera) {
+  const Motion motion = own_motion(GetParam());
+  const Scene scene = build_scene(GetParam(), motion, 1);
+  for (const auto distortion : {Distortion::kNone, Distortion::kRadtan, Distortion::kEquidistant}) {
+    SCOPED_TRACE(to_string(distortion));
+    const StereoRig rig = small_rig(distortion);
+    RenderedImage left;
+    RenderedImage right;
+    const SE3 pose = motion.at(6.0);
+    Renderer(scene, rig.left).render(pose, 6.0, &left);
+    Renderer(scene, rig.right).render(pose * rig.T_right_left.inverse(), 6.0, &right);
+    ExposureControl exposure({}, scene.exposure_s);
+    exposure.settle(left.light);
+    const Pair pair{rig, take(left.light, exposure, 1), take(right.light, exposure, 2), left.range};
+    const Residuals truth = warp(pair, 1.0);
+    ASSERT_GT(truth.absolute.size(), 3000U);
+    // Two noises of about 1, and what bilinear interpolation loses of texture.
+    EXPECT_LT(truth.quantile(0.5), 2.0 + 0.12 * truth.contrast) << "contrast " << truth.contrast;
+    const Residuals wrong = warp(pair, 1.25);
+    EXPECT_GT(wrong.quantile(0.7), 1.25 * truth.quantile(0.7));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(AllWorlds, WarpTest,
+                         ::testing::Values(World::kLawn, World::kPool, World::kStreet,
+                                           World::kHall));
+
+TEST(SimSourceTest, EqualSeedsGiveEqualBytesWithAnyNumberOfThreads) {
+  SimConfig config = quiet(World::kHall);
+  config.sensor = {};
+  const StereoRig rig = small_rig(Distortion::kRadtan);
+  config.threads = 1;
+  SimSource a = make_source(config, rig);
+  config.threads = 2;
+  SimSource b = make_source(config, rig);
+  config.seed = 2;
+  SimSource c = make_source(config, rig);
+  for (int i = 0; i < 2; ++i) {
+    const StereoFrame fa = first_frame(a);
+    const StereoFrame fb = first_frame(b);
+    EXPECT_EQ(*fa.left.data, *fb.left.data);
+    EXPECT_EQ(*fa.right.data, *fb.right.data);
+    EXPECT_EQ(fa.left.exposure_s, fb.left.exposure_s);
+    EXPECT_NE(*fa.left.data, *first_frame(c).left.data);
+  }
+  EXPECT_EQ(a.next(std::chrono::seconds(10)).state, SourceState::kEndOfStream);
+}
+
+TEST(SimSourceTest, DepthOfPlacesIsThatOfTheImage) {
+  const SimConfig config = quiet(World::kPool);
+  SimSource source = make_source(config, small_rig(Distortion::kNone));
+  const std::int64_t stamp = source.truth().front().stamp_ns;
+  const ImageF depth = source.depth_at(stamp);
+  const auto places = source.depth_at(stamp, {{80, 90}, {20, 100}, {80.5, 90}});
+  EXPECT_NEAR(places[0], depth.at(80, 90), 1e-4);
+  EXPECT_NEAR(places[1], depth.at(20, 100), 1e-4);
+  EXPECT_NEAR(places[2], 0.5 * (depth.at(80, 90) + depth.at(81, 90)), 2e-2);
+}
+
+TEST(SimSourceTest, DarkCameraAndDroppedPairs) {
+  SimConfig config = quiet(World::kLawn);
+  config.frames = 9;
+  config.sensor.drop_rate = 0.4;
+  config.sensor.dark = Side::kRight;
+  config.sensor.right_offset_ms = 1.5;
+  SimSource source = make_source(config, small_rig(Distortion::kNone));
+  ASSERT_LT(*source.size(), 9U);
+  ASSERT_GT(*source.size(), 2U);
+  const StereoFrame frame = first_frame(source);
+  const auto mean = [](const SideImage& image) {
+    double sum = 0.0;
+    for (const std::uint8_t p : *image.data) sum += p;
+    return sum / static_cast<double>(image.data->size());
+  };
+  EXPECT_NEAR(mean(frame.left), config.sensor.target_grey, 12.0);
+  EXPECT_LT(mean(frame.right), 2.0);
+  EXPECT_EQ(frame.right.stamp_offset_ns, 1'500'000);
+  std::uint64_t last = frame.sequence;
+  bool gap = false;
+  for (std::size_t i = 1; i < *source.size(); ++i) {
+    const StereoFrame next = first_frame(source);
+    gap |= next.sequence > last + 1;
+    last = next.sequence;
+  }
+  EXPECT_TRUE(gap);
+}
+
+TEST(SimSourceTest, BackwardsIsTheMirrorInTime) {
+  SimConfig config = quiet(World::kHall);
+  SimSource forward = make_source(config, small_rig(Distortion::kNone));
+  config.reverse = true;
+  SimSource backward = make_source(config, small_rig(Distortion::kNone));
+  const Motion motion = own_motion(World::kHall);
+  const Trajectory truth = backward.truth();
+  EXPECT_LT((truth.front().T_world_body.translation() -
+             motion.samples().back().T_world_body.translation())
+                .norm(),
+            1e-9);
+  EXPECT_EQ(backward.original_stamp(truth.front().stamp_ns), motion.last_ns());
+  EXPECT_EQ(forward.original_stamp(motion.first_ns()), motion.first_ns());
+}
+
+TEST(SimSourceTest, WrongValuesAreRefusedWithAReason) {
+  SimConfig config;
+  config.trajectory = "/nowhere/poses.txt";
+  EXPECT_NE(open_sim(config).error().find("/nowhere/poses.txt"), std::string::npos);
+  config = {};
+  config.sensor.vignette = 2.0;
+  EXPECT_NE(open_sim(config).error().find("vignette"), std::string::npos);
+}
+
+TEST(SimExportTest, ReadsBackToTheSamePixels) {
+  namespace fs = std::filesystem;
+  const fs::path root = fs::path(::testing::TempDir()) / "sim_export";
+  fs::remove_all(root);
+  SimConfig config = quiet(World::kHall);
+  config.sensor.vignette = 0.3;
+  config.sensor.response_gamma = 1.4;
+  const StereoRig rig = small_rig(Distortion::kRadtan);
+  SimSource exported = make_source(config, rig);
+  const auto done = export_dataset(&exported, root.string(), true);
+  ASSERT_TRUE(done) << done.error();
+  DatasetOptions options;
+  options.path = root.string();
+  auto dataset = open_dataset(options);
+  ASSERT_TRUE(dataset) << dataset.error();
+  SimSource rendered = make_source(config, rig);
+  for (int i = 0; i < config.frames; ++i) {
+    const SourceResult read = (*dataset)->next(std::chrono::seconds(10));
+    ASSERT_EQ(read.state, SourceState::kFrame) << read.message;
+    const StereoFrame frame = first_frame(rendered);
+    EXPECT_EQ(read.frame.stamp_ns, frame.stamp_ns);
+    EXPECT_EQ(*read.frame.left.data, *frame.left.data);
+    EXPECT_EQ(*read.frame.right.data, *frame.right.data);
+    EXPECT_NEAR(read.frame.left.exposure_s, frame.left.exposure_s, 1e-8);
+    const fs::path depth = root / "depth" / (std::to_string(frame.stamp_ns) + ".pfm");
+    EXPECT_GT(fs::file_size(depth), 160U * 112U * 4U);
+  }
+  const StereoRig& back = (*dataset)->rig();
+  EXPECT_LT((back.T_right_left.matrix() - rig.T_right_left.matrix()).norm(), 1e-12);
+  EXPECT_EQ(back.right.d, rig.right.d);
+  const auto& photometric = (*dataset)->calibration().left_photometric;
+  ASSERT_FALSE(photometric.vignette.empty());
+  EXPECT_NEAR(photometric.vignette.at(0, 0), 0.7, 2e-3);
+  EXPECT_NEAR(photometric.inverse_response[128], 255.0 * std::pow(128 / 255.0, 1.4), 1e-2);
+  const auto truth = read_tum((root / "groundtruth_cam0_tum.txt").string());
+  ASSERT_TRUE(truth) << truth.error();
+  EXPECT_EQ(truth->size(), 2U);
+  EXPECT_LT((truth->back().T_world_body.translation() -
+             rendered.truth().back().T_world_body.translation())
+                .norm(),
+            1e-8);
+}
+
+}  // namespace
+}  // namespace sovo::sim

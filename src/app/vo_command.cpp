@@ -66,7 +66,6 @@ class VoProcess {
   }
 
   void take(const StereoFrame& frame) {
-    last_frame_ = Clock::now();
     ++taken_;
     follow_session(frame);
     publisher_.set_feed(feed());
@@ -79,6 +78,7 @@ class VoProcess {
       reported_failures_ = publisher_.failed_writes();
       spdlog::warn("not published: {}", publisher_.last_failure());
     }
+    last_frame_ = Clock::now();  // the time that a frame took is no idleness
   }
 
   /// Another session is another run of the camera: nothing connects it with the map.

@@ -22,7 +22,7 @@ void render_pairs(benchmark::State& state, World world) {
   ImageF blurred;
   const SE3 T_left_right = calibration.rig.T_right_left.inverse();
   double t = 3.0;
-  for (auto _ : state) {
+  for ([[maybe_unused]] const auto _ : state) {
     for (Renderer* renderer : {&left, &right}) {
       const SE3 pose = renderer == &left ? motion.at(t) : motion.at(t) * T_left_right;
       renderer->render(pose, t, &image);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <ranges>
 
 #include "sovo/io/text.h"
 
@@ -161,7 +160,8 @@ std::string draw_series(const ChartSeries& series, const Frame& f) {
 std::string draw_legend(const Chart& chart, const Frame& f) {
   std::string out;
   double x = f.x + f.width;
-  for (const auto& series : std::views::reverse(chart.series)) {
+  for (std::size_t i = chart.series.size(); i-- > 0;) {
+    const auto& series = chart.series[i];
     if (series.name.empty()) continue;
     x -= 7.0 * static_cast<double>(series.name.size()) + 4.0;
     out += text_at(x, f.y - 12, "class=\"tick\"", series.name);

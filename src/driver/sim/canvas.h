@@ -24,7 +24,7 @@ class Canvas {
     double w0, w1;
     float v0, v1;
   };
-  void stroke(const Stroke& stroke);
+  void stroke(const Stroke& k);
 
   /// Ellipse with half axes a and b, turned by `angle` [rad].
   void ellipse(double x, double y, double a, double b, double angle, float value,

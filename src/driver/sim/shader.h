@@ -28,9 +28,9 @@ class Shader {
   struct Spot;
   Spot spot(const SurfaceView& view, const Eigen::Vector3f& ray, float range,
             float pixel_angle) const;
-  float pattern(const Layer& layer, const Spot& spot) const;
+  float pattern(const Layer& l, const Spot& p) const;
   float reflected(const Material& material, const Spot& spot) const;
-  float caustics(const Spot& spot) const;
+  float caustics(const Spot& p) const;
   float hills(double azimuth, double elevation, float pixel_angle, float beyond) const;
 
   const Scene* scene_;

@@ -44,7 +44,7 @@ class SimSource : public FrameSource {
 
  private:
   SourceResult render(std::size_t n);
-  SideImage make_side(Side side, double t, std::uint64_t frame, Renderer* renderer,
+  SideImage make_side(Side which, double t, std::uint64_t frame, Renderer* renderer,
                       ExposureControl* exposure, const Sensor& sensor) const;
   double time_of(std::size_t index) const;
   std::int64_t stamp_of(std::size_t index) const;

@@ -1,5 +1,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "sovo/driver/sim/sensor.h"
@@ -17,13 +18,11 @@ Vector2f flow_of(const RayTable& rays, int x, int y, float range, const Vector3f
   // A point at rest: d ray = -(turn x ray) - (shift - ray (ray . shift)) / range.
   Vector3f change = -turn.cross(ray);
   if (std::isfinite(range)) change -= (shift - ray * ray.dot(shift)) / range;
-  const Vector3f a = rays.ray_step_x(x, y);
-  const Vector3f b = rays.ray_step_y(x, y);
-  const float aa = a.dot(a), ab = a.dot(b), bb = b.dot(b);
-  const float determinant = aa * bb - ab * ab;
-  if (!(determinant > 0.0F)) return Vector2f::Zero();
-  const float ca = a.dot(change), cb = b.dot(change);
-  return {(ca * bb - cb * ab) / determinant, (cb * aa - ca * ab) / determinant};
+  const RayTable::PixelStep& step = rays.pixel_step(x, y);
+  const auto along = [&change](const std::array<float, 3>& row) {
+    return row[0] * change.x() + row[1] * change.y() + row[2] * change.z();
+  };
+  return {along(step.x), along(step.y)};
 }
 
 float sample(const ImageF& image, float x, float y) {
@@ -43,7 +42,7 @@ float sample(const ImageF& image, float x, float y) {
 
 void blur_by_motion(const RayTable& rays, const RenderedImage& image, const Vec6& velocity,
                     double exposure_s, ImageF* blurred) {
-  constexpr float kVisible = 0.3F;  // [px]
+  constexpr float kVisible = 0.5F;  // [px]; less takes a few hundredths of the finest detail
   constexpr int kMostTaps = 33;
   const ImageF& light = image.light;
   blurred->resize(light.width(), light.height());

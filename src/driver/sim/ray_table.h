@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -55,18 +56,26 @@ class RayTable {
     const std::size_t i = index(x, y);
     return {dx_[i], dy_[i], dz_[i]};
   }
+  /// How a change of the ray moves the pixel: rows of d x / d ray and d y / d ray; zero where the
+  /// camera sees nothing.
+  struct PixelStep {
+    std::array<float, 3> x{}, y{};
+  };
+  const PixelStep& pixel_step(int x, int y) const { return steps_[index(x, y)]; }
   /// Change of the ray from pixel to pixel along x and y; the image's edge repeats its neighbours.
   Eigen::Vector3f ray_step_x(int x, int y) const;
   Eigen::Vector3f ray_step_y(int x, int y) const;
 
  private:
   static std::size_t offset(int tile) { return static_cast<std::size_t>(tile) * kTilePixels; }
+  PixelStep pixel_step_of(int x, int y) const;
   RayCone cone_of(int x0, int y0, int side) const;
 
   CameraModel camera_;
   int tiles_x_;
   int tiles_y_;
   AlignedVector<float> dx_, dy_, dz_, angle_;
+  std::vector<PixelStep> steps_;
   std::vector<RayCone> cones_;
   std::vector<RayCone> blocks_;
 };

@@ -39,10 +39,12 @@ std::vector<std::uint32_t> quads(const ImageF& image) {
 
 Texture::Texture(const ImageF& pattern) {
   ImageF image = pattern;
-  levels_.push_back(quads(image));
-  while (image.width() > 1) {
+  while (true) {
+    const auto size = static_cast<std::uint32_t>(image.width());
+    const auto half = static_cast<std::uint32_t>((std::uint64_t{1} << 31) / size);
+    levels_.push_back({size, half, quads(image)});
+    if (size == 1) break;
     image = halved(image);
-    levels_.push_back(quads(image));
   }
   mean_ = std::clamp(image.at(0, 0), 0.0F, 1.0F);
 }

@@ -50,17 +50,24 @@ class Texture {
   }
 
  private:
+  struct Level {
+    std::uint32_t size = 1;
+    std::uint32_t half_texel = 0;  ///< In units of `TexturePlace`.
+    /// Every entry has the texel, its right neighbour, and the two below them, in this order from
+    /// the lowest byte on.
+    std::vector<std::uint32_t> quads;
+  };
+
   /// 255 * 65536 times the value.
   int bilinear(int level, TexturePlace place) const {
-    const auto l = static_cast<std::size_t>(level);
-    const int bits = num_levels() - 1 - level;
-    // Texel centres are at half texels. 64 bits, so that a level of one texel can be shifted out.
-    const std::uint32_t half = static_cast<std::uint32_t>(std::uint64_t{1} << (31 - bits));
-    const std::uint64_t u = std::uint64_t{place.u - half} << bits;
-    const std::uint64_t v = std::uint64_t{place.v - half} << bits;
-    const std::uint32_t fu = static_cast<std::uint32_t>(u >> 24) & 255U;
-    const std::uint32_t fv = static_cast<std::uint32_t>(v >> 24) & 255U;
-    const std::uint32_t quad = levels_[l][(v >> 32 << bits) + (u >> 32)];
+    const Level& l = levels_[static_cast<std::size_t>(level)];
+    // Texel centres are at half texels. The upper words are the texel, what follows the place in
+    // it.
+    const std::uint64_t u = std::uint64_t{place.u - l.half_texel} * l.size;
+    const std::uint64_t v = std::uint64_t{place.v - l.half_texel} * l.size;
+    const std::uint32_t fu = static_cast<std::uint32_t>(u) >> 24;
+    const std::uint32_t fv = static_cast<std::uint32_t>(v) >> 24;
+    const std::uint32_t quad = l.quads[(v >> 32) * l.size + (u >> 32)];
     // The upper and the lower pair at once, in the two halves of a word.
     const std::uint32_t left = quad & 0x00FF00FFU;
     const std::uint32_t right = quad >> 8 & 0x00FF00FFU;
@@ -68,9 +75,7 @@ class Texture {
     return static_cast<int>((rows & 0xFFFFU) * (256U - fv) + (rows >> 16) * fv);
   }
 
-  /// Levels from the finest to one texel. Every entry has the texel, its right neighbour, and the
-  /// two below them, in this order from the lowest byte on.
-  std::vector<std::vector<std::uint32_t>> levels_;
+  std::vector<Level> levels_;  ///< From the finest to one texel.
   float mean_ = 0.0F;
 };
 

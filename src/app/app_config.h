@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "sovo/bridge/dds_config.h"
+#include "sovo/driver/sim/sim_config.h"
 #include "sovo/odometry/stereo_odometry.h"
 
 namespace sovo::app {
@@ -28,7 +29,8 @@ constexpr std::array<std::pair<Kernels, const char*>, 2> enum_names(Kernels) {
   return {{{Kernels::kAuto, "auto"}, {Kernels::kScalar, "scalar"}}};
 }
 
-/// Where frames come from when they are read from a folder.
+/// Where frames come from when they are read from a folder; all but `path`, `frame_rate` holds for
+/// simulated cameras too.
 struct CameraSection {
   std::string path;         ///< Dataset folder.
   std::string calibration;  ///< Empty: the one that belongs to the dataset.
@@ -60,6 +62,7 @@ struct OutputSection {
   std::string live_trajectory;
   std::string keyframes;
   std::string profile;
+  std::string truth;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -67,6 +70,7 @@ struct OutputSection {
     v("live_trajectory", live_trajectory, "TUM file of the poses as published at the time");
     v("keyframes", keyframes, "CSV file of every scale optimization");
     v("profile", profile, "JSON file of the times by stage");
+    v("truth", truth, "TUM file of the true poses of simulated cameras");
   }
 };
 
@@ -88,6 +92,7 @@ struct AppConfig {
   Kernels kernels = Kernels::kAuto;
   StereoOdometryConfig odometry;  ///< Its keys stand at the top level of the file.
   CameraSection camera;
+  sim::SimConfig sim;
   OutputSection output;
   NodeSection node;
   bridge::DdsConfig dds;
@@ -98,6 +103,7 @@ struct AppConfig {
     v("kernels", kernels, "implementation of the inner loops");
     odometry.visit(v);
     v("camera", camera, "source of frames");
+    v("sim", sim, "simulated cameras");
     v("output", output, "files that a run leaves");
     v("node", node, "what only a process on the bus has");
     v("dds", dds, "how processes find each other");

@@ -26,13 +26,12 @@ struct CalibOptions {
   int pairs = 5;
 };
 
-void add_input(CLI::App* command, CalibOptions* options) {
-  command->add_option("path", options->path, "Calibration file, or a folder that has one")
-      ->required();
-  command->add_option("--right", options->right_path, "ROS camera_info of the right camera");
-  command->add_option("--size", options->size,
-                      "Image size WIDTHxHEIGHT, where the file has none (KITTI, OpenCV)");
-  command->add_flag("--colour", options->colour, "KITTI: the colour cameras, P2 and P3");
+void add_input(const Command& command, CalibOptions* options) {
+  command.option("path", "Calibration file, or a folder that has one", &options->path).required();
+  command.option("--right", "ROS camera_info of the right camera", &options->right_path);
+  command.option("--size", "Image size WIDTHxHEIGHT, where the file has none (KITTI, OpenCV)",
+                 &options->size);
+  command.flag("--colour", "KITTI: the colour cameras, P2 and P3", &options->colour);
 }
 
 Result<Calibration> load(const CalibOptions& options, bool validate) {
@@ -170,40 +169,41 @@ int check(CalibOptions options) {
   return report(check_calibration_on_images(calibration->rig, *pairs));
 }
 
+int convert_checked(const CalibOptions& options) {
+  if (options.to == "ros" && options.out.empty()) {
+    return fail(kUsage, "--to ros writes two files: give their folder with --out");
+  }
+  return convert(options);
+}
+
 }  // namespace
 
-void add_calib_command(CLI::App& app, int* exit_code) {
-  CLI::App* command = app.add_subcommand("calib", "Calibration files: show, convert, check");
-  command->require_subcommand(1);
+void add_calib_command(const Command& program) {
+  const Command command = program.add_command("calib", "Calibration files: show, convert, check");
+  command.require_command();
   const auto options = std::make_shared<CalibOptions>();
 
-  CLI::App* show_command = command->add_subcommand("show", "Print a calibration in words");
-  add_input(show_command, options.get());
-  show_command->callback([options, exit_code] { *exit_code = show(*options); });
+  const Command showing = command.add_command("show", "Print a calibration in words");
+  add_input(showing, options.get());
+  showing.action([options] { return show(*options); });
 
-  CLI::App* convert_command = command->add_subcommand("convert", "Write it in another format");
-  add_input(convert_command, options.get());
-  convert_command->add_option("--to", options->to, "sovo, or ros (left.yaml and right.yaml)")
-      ->check(CLI::IsMember({"sovo", "ros"}));
-  convert_command->add_option("--out", options->out,
-                              "File (sovo; standard output when not given) or folder (ros)");
-  convert_command->callback([options, exit_code] {
-    if (options->to == "ros" && options->out.empty()) {
-      *exit_code = fail(kUsage, "--to ros writes two files: give their folder with --out");
-      return;
-    }
-    *exit_code = convert(*options);
-  });
+  const Command converting = command.add_command("convert", "Write it in another format");
+  add_input(converting, options.get());
+  converting.option("--to", "sovo, or ros (left.yaml and right.yaml)", &options->to)
+      .one_of({"sovo", "ros"});
+  converting.option("--out", "File (sovo; standard output when not given) or folder (ros)",
+                    &options->out);
+  converting.action([options] { return convert_checked(*options); });
 
-  CLI::App* check_command = command->add_subcommand(
+  const Command checking = command.add_command(
       "check",
       "Look for swapped cameras, wrong units and decalibration, in the numbers and in images");
-  add_input(check_command, options.get());
-  check_command->add_option("--dataset", options->dataset,
-                            "Images to check against; the calibration's folder when it has them");
-  check_command->add_option("--pairs", options->pairs, "How many pairs of it are looked at")
-      ->check(CLI::Range(1, 1000));
-  check_command->callback([options, exit_code] { *exit_code = check(*options); });
+  add_input(checking, options.get());
+  checking.option("--dataset", "Images to check against; the calibration's folder when it has them",
+                  &options->dataset);
+  checking.option("--pairs", "How many pairs of it are looked at", &options->pairs)
+      .in_range(1, 1000);
+  checking.action([options] { return check(*options); });
 }
 
 }  // namespace sovo::app

@@ -1,17 +1,20 @@
 #include <chrono>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <random>
 #include <thread>
 
 #include "sovo/app/commands.h"
 #include "sovo/app/config_options.h"
-#include "sovo/app/dataset_input.h"
 #include "sovo/app/failure.h"
+#include "sovo/app/frame_input.h"
 #include "sovo/app/progress.h"
+#include "sovo/app/sim_input.h"
 #include "sovo/app/stop_signal.h"
 #include "sovo/app/vo_follower.h"
 #include "sovo/bridge/camera_publisher.h"
+#include "sovo/io/text.h"
 
 namespace sovo::app {
 namespace {
@@ -26,11 +29,11 @@ std::int64_t utc_now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
 }
 
-/// A dataset on its way to the bus.
-class DatasetPublication {
+/// Frames on their way to the bus.
+class Publication {
  public:
-  DatasetPublication(DatasetSource& source, bridge::CameraPublisher& publisher,
-                     VoFollower& follower, StopSignal& stop)
+  Publication(FrameSource& source, bridge::CameraPublisher& publisher, VoFollower& follower,
+              StopSignal& stop)
       : source_(source),
         publisher_(publisher),
         follower_(follower),
@@ -72,7 +75,7 @@ class DatasetPublication {
     }
   }
 
-  DatasetSource& source_;
+  FrameSource& source_;
   bridge::CameraPublisher& publisher_;
   VoFollower& follower_;
   std::function<bool()> stop_;
@@ -80,42 +83,108 @@ class DatasetPublication {
   std::size_t published_ = 0;
 };
 
-int publish_dataset(const AppConfig& config) {
-  if (config.camera.path.empty()) return fail(kUsage, "no dataset given; use --path FOLDER");
+/// Publishes what `open` gives, called when the signals are taken care of.
+int publish(const AppConfig& config, const std::function<Result<FrameInput>()>& open) {
   StopSignal stop;  // before the threads of source and bus
-  auto source = open_dataset_input(config.camera, 1.0);
-  if (!source) return fail(kBadInput, source.error());
+  auto input = open();
+  if (!input) return fail(kBadInput, input.error());
   auto participant = bridge::Participant::open(config.dds, "camera");
   if (!participant) return fail(kFailed, participant.error());
   for (const std::string& note : participant->notes()) spdlog::info("{}", note);
 
-  StereoCameras cameras = to_cameras((*source)->calibration());
+  StereoCameras cameras = input->cameras;
   if (!config.camera.name.empty()) cameras.rig.name = config.camera.name;
   auto publisher = bridge::CameraPublisher::open(*participant, cameras, utc_now_ns());
   if (!publisher) return fail(kFailed, publisher.error());
   const std::uint64_t session = random_session();
   auto follower = VoFollower::open(*participant, session);
   if (!follower) return fail(kFailed, follower.error());
-  const bool paced = *parse_rate(config.camera.rate, 1.0) == 0.0;
-  return DatasetPublication(**source, *publisher, *follower, stop).run(session, paced);
+  return Publication(*input->source, *publisher, *follower, stop).run(session, input->rate == 0.0);
+}
+
+int publish_dataset(const AppConfig& config) {
+  if (config.camera.path.empty()) return fail(kUsage, "no dataset given; use --path FOLDER");
+  return publish(config, [&config] { return open_dataset_input(config.camera, 1.0); });
+}
+
+/// What `camera sim` has beside the configuration.
+struct SimArguments {
+  std::string rate;
+  std::string export_to;
+  bool depth = false;
+};
+
+/// `--rate` of simulated cameras is the world's own clock: pairs a second, or as fast as can be.
+Result<void> apply_rate(const std::string& rate, AppConfig* config) {
+  if (rate.empty()) return {};
+  if (rate == "max") {
+    config->camera.rate = rate;
+    return {};
+  }
+  const auto hertz = parse_double(rate);
+  if (!hertz || !(*hertz > 0.0)) {
+    return Error{"--rate is '" + rate + "'; it must be pairs a second [Hz], or max"};
+  }
+  config->sim.frame_rate = *hertz;
+  return {};
+}
+
+int simulate(AppConfig config, const SimArguments& arguments) {
+  if (auto applied = apply_rate(arguments.rate, &config); !applied) {
+    return fail(kUsage, applied.error());
+  }
+  if (!arguments.export_to.empty()) return export_sim(config, arguments.export_to, arguments.depth);
+  if (arguments.depth) return fail(kUsage, "--depth writes files: give their folder with --export");
+  return publish(config, [&config] { return open_sim_input(config, 1.0, false); });
+}
+
+void add_dataset_command(const Command& camera) {
+  const Command command = camera.add_command("dataset", "Publish a recorded dataset");
+  auto options = std::make_shared<ConfigOptions>(command);
+  options->value("--path", "camera.path", "Folder of the dataset", "DIR")
+      .flag("--restamp", "camera.restamp", "Shift the stamps so that the first frame is now")
+      .value("--name", "camera.name", "Prefix of the camera's frame names", "NAME")
+      .value("--rate", "camera.rate", "Speed: 1.0 is real time, max as fast as can be", "X|max");
+  add_dataset_options(*options);
+  add_dds_options(*options);
+  command.action([options] {
+    const auto config = options->load();
+    return config ? publish_dataset(*config) : fail(kUsage, config.error());
+  });
+}
+
+void add_sim_command(const Command& camera) {
+  const Command command = camera.add_command("sim", "Publish, or export, a rendered world");
+  auto options = std::make_shared<ConfigOptions>(command);
+  auto arguments = std::make_shared<SimArguments>();
+  add_sim_options(*options);
+  options->value("--seed", "sim.seed", "Of the world and the noise", "N")
+      .flag("--restamp", "camera.restamp", "Shift the stamps so that the first frame is now")
+      .value("--name", "camera.name", "Prefix of the camera's frame names", "NAME");
+  command
+      .option("--rate", "Pairs a second, or max: as fast as the odometry takes them",
+              &arguments->rate)
+      .type("HZ|max");
+  command
+      .option("--export", "Write an EuRoC-layout folder instead; needs no bus",
+              &arguments->export_to)
+      .type("DIR");
+  command.flag("--depth", "With --export: true depth of every left pixel", &arguments->depth);
+  add_dataset_options(*options);
+  add_dds_options(*options);
+  command.action([options, arguments] {
+    const auto config = options->load();
+    return config ? simulate(*config, *arguments) : fail(kUsage, config.error());
+  });
 }
 
 }  // namespace
 
-void add_camera_command(CLI::App& app, int* exit_code) {
-  CLI::App* camera = app.add_subcommand("camera", "Publish stereo frames on the bus");
-  camera->require_subcommand(1);
-  CLI::App* dataset = camera->add_subcommand("dataset", "Publish a recorded dataset");
-  auto options = std::make_shared<ConfigOptions>(dataset);
-  options->value("--path", "camera.path", "Folder of the dataset", "DIR")
-      .flag("--restamp", "camera.restamp", "Shift the stamps so that the first frame is now")
-      .value("--name", "camera.name", "Prefix of the camera's frame names", "NAME");
-  add_dataset_options(*options);
-  add_dds_options(*options);
-  dataset->callback([options, exit_code] {
-    const auto config = options->load();
-    *exit_code = config ? publish_dataset(*config) : fail(kUsage, config.error());
-  });
+void add_camera_command(const Command& program) {
+  const Command camera = program.add_command("camera", "Publish stereo frames on the bus");
+  camera.require_command();
+  add_dataset_command(camera);
+  add_sim_command(camera);
 }
 
 }  // namespace sovo::app

@@ -80,26 +80,26 @@ int send(const AppConfig& config, std::uint8_t what) {
   return kOk;
 }
 
-void add_one(CLI::App& parent, const std::string& name, const std::string& help, std::uint8_t what,
-             int* exit_code) {
-  CLI::App* command = parent.add_subcommand(name, help);
+void add_one(const Command& parent, const std::string& name, const std::string& help,
+             std::uint8_t what) {
+  const Command command = parent.add_command(name, help);
   auto options = std::make_shared<ConfigOptions>(command);
   add_dds_options(*options);
-  command->callback([options, what, exit_code] {
+  command.action([options, what] {
     const auto config = options->load();
-    *exit_code = config ? send(*config, what) : fail(kUsage, config.error());
+    return config ? send(*config, what) : fail(kUsage, config.error());
   });
 }
 
 }  // namespace
 
-void add_command_command(CLI::App& app, int* exit_code) {
+void add_command_command(const Command& program) {
   using Traits = bridge::MessageTraits<VoCommand>;
-  CLI::App* command = app.add_subcommand("command", "Send a command to the odometry process");
-  command->require_subcommand(1);
-  add_one(*command, "reset", "Forget the map and begin a new segment", Traits::RESET, exit_code);
-  add_one(*command, "pause", "Leave frames unprocessed until resume", Traits::PAUSE, exit_code);
-  add_one(*command, "resume", "Process frames again", Traits::RESUME, exit_code);
+  const Command command = program.add_command("command", "Send a command to the odometry process");
+  command.require_command();
+  add_one(command, "reset", "Forget the map and begin a new segment", Traits::RESET);
+  add_one(command, "pause", "Leave frames unprocessed until resume", Traits::PAUSE);
+  add_one(command, "resume", "Process frames again", Traits::RESUME);
 }
 
 }  // namespace sovo::app

@@ -1,19 +1,18 @@
 #pragma once
 
-#include <CLI/CLI.hpp>
+#include "sovo/app/command.h"
 
 namespace sovo::app {
 
-// Each function adds one subcommand to `app`; its callback does the work and sets `*exit_code`
-// (see exit_codes.h), which must outlive the parsing.
+// Each function adds one subcommand to the program's commands.
 
-void add_calib_command(CLI::App& app, int* exit_code);
-void add_camera_command(CLI::App& app, int* exit_code);
-void add_command_command(CLI::App& app, int* exit_code);
-void add_config_command(CLI::App& app, int* exit_code);
-void add_eval_command(CLI::App& app, int* exit_code);
-void add_run_command(CLI::App& app, int* exit_code);
-void add_status_command(CLI::App& app, int* exit_code);
-void add_vo_command(CLI::App& app, int* exit_code);
+void add_calib_command(const Command& program);
+void add_camera_command(const Command& program);
+void add_command_command(const Command& program);
+void add_config_command(const Command& program);
+void add_eval_command(const Command& program);
+void add_run_command(const Command& program);
+void add_status_command(const Command& program);
+void add_vo_command(const Command& program);
 
 }  // namespace sovo::app

@@ -8,20 +8,18 @@
 
 namespace sovo::app {
 
-void add_config_command(CLI::App& app, int* exit_code) {
-  CLI::App* command = app.add_subcommand(
+void add_config_command(const Command& program) {
+  const Command command = program.add_command(
       "config",
       "Print the configuration as YAML with comments: the defaults, or what --config, "
       "--set and the options make of them");
   auto options = std::make_shared<ConfigOptions>(command);
   options->value("--preset", "preset", "Values to begin with", "default|fast");
-  command->callback([options, exit_code] {
+  command.action([options]() -> int {
     const auto config = options->load();
-    if (!config) {
-      *exit_code = fail(kUsage, config.error());
-      return;
-    }
+    if (!config) return fail(kUsage, config.error());
     std::cout << dump_config(*config);
+    return kOk;
   });
 }
 

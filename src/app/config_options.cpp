@@ -1,17 +1,12 @@
 #include "sovo/app/config_options.h"
 
-#include <spdlog/fmt/fmt.h>
+#include <algorithm>
 
-#include "sovo/app/dataset_input.h"
+#include "sovo/app/frame_input.h"
 #include "sovo/io/yaml_config.h"
 
 namespace sovo::app {
 namespace {
-
-const CLI::App& root_of(const CLI::App* command) {
-  while (command->get_parent() != nullptr) command = command->get_parent();
-  return *command;
-}
 
 std::vector<std::string> preset_assignments(Preset preset) {
   if (preset == Preset::kDefault) return {};
@@ -31,32 +26,35 @@ Result<void> apply_all(const std::vector<std::string>& assignments, AppConfig* c
 
 ConfigOptions& ConfigOptions::value(const std::string& name, const std::string& key,
                                     const std::string& help, const std::string& type) {
-  CLI::Option* option = command_->add_option(name, help);
-  option->expected(1)->type_name(type.empty() ? "VALUE" : type);
-  bindings_.push_back({option, key, false});
+  CommandOption option = command_.option(name, help).type(type.empty() ? "VALUE" : type);
+  bindings_.push_back({name, option, key, false});
   return *this;
 }
 
 ConfigOptions& ConfigOptions::flag(const std::string& name, const std::string& key,
                                    const std::string& help) {
-  bindings_.push_back({command_->add_flag(name, help), key, true});
+  bindings_.push_back({name, command_.flag(name, help), key, true});
   return *this;
+}
+
+bool ConfigOptions::is_given(const std::string& name) const {
+  return std::any_of(bindings_.begin(), bindings_.end(),
+                     [&name](const Binding& b) { return b.name == name && b.option.count() > 0; });
 }
 
 std::vector<std::string> ConfigOptions::assignments() const {
   std::vector<std::string> all;
-  const CLI::Option* set = root_of(command_).get_option("--set");
-  for (const std::string& assignment : set->results()) all.push_back(assignment);
+  for (const std::string& a : command_.global_option("--set").values()) all.push_back(a);
   for (const Binding& b : bindings_) {
-    if (b.option->count() == 0) continue;
-    all.push_back(b.key + "=" + (b.is_flag ? "true" : b.option->results().back()));
+    if (b.option.count() == 0) continue;
+    all.push_back(b.key + "=" + (b.is_flag ? "true" : b.option.values().back()));
   }
   return all;
 }
 
 Result<AppConfig> ConfigOptions::load() const {
-  const CLI::Option* file = root_of(command_).get_option("--config");
-  const std::string path = file->count() > 0 ? file->results().back() : "";
+  const CommandOption file = command_.global_option("--config");
+  const std::string path = file.count() > 0 ? file.values().back() : "";
   const auto apply_user = [&](AppConfig* config) -> Result<void> {
     if (!path.empty()) {
       if (auto loaded = load_config(path, config); !loaded) return loaded;
@@ -98,8 +96,14 @@ void add_dataset_options(ConfigOptions& options) {
       .value("--calib", "camera.calibration", "Calibration file, instead of the dataset's", "FILE")
       .value("--start", "camera.start", "Frames left out at the beginning", "N")
       .value("--frames", "camera.frames", "Frames at most", "N")
-      .value("--rate", "camera.rate", "Speed: 1.0 is real time, max as fast as can be", "X|max")
       .flag("--reverse", "camera.reverse", "Feed the frames backwards");
+}
+
+void add_sim_options(ConfigOptions& options) {
+  options.value("--world", "sim.world", "What is rendered", "lawn|pool|street|hall")
+      .value("--trajectory", "sim.trajectory",
+             "One of the world's own, or a TUM, EuRoC or KITTI pose file", "NAME|FILE")
+      .value("--truth", "output.truth", "Write the true trajectory (TUM)", "FILE");
 }
 
 void add_odometry_options(ConfigOptions& options) {

@@ -17,50 +17,52 @@ struct EvalArguments {
   std::string plot;
 };
 
-void add_options(CLI::App* command, EvalArguments* a) {
-  command->add_option("--gt", a->files.truth, "True trajectory: TUM, KITTI or EuRoC, by content")
-      ->required()
-      ->type_name("FILE");
-  command->add_option("--est", a->files.estimate, "Estimated trajectory, of the left camera")
-      ->required()
-      ->type_name("FILE");
+void add_options(const Command& command, EvalArguments* a) {
+  command.option("--gt", "True trajectory: TUM, KITTI or EuRoC, by content", &a->files.truth)
+      .required()
+      .type("FILE");
+  command.option("--est", "Estimated trajectory, of the left camera", &a->files.estimate)
+      .required()
+      .type("FILE");
   command
-      ->add_option("--gt-calib", a->files.truth_calibration,
-                   "Brings truth of the body to the left camera: EuRoC's cam0/sensor.yaml, a "
-                   "Kalibr camchain, our calibration, or a dataset's folder")
-      ->type_name("FILE");
+      .option("--gt-calib",
+              "Brings truth of the body to the left camera: EuRoC's cam0/sensor.yaml, a Kalibr "
+              "camchain, our calibration, or a dataset's folder",
+              &a->files.truth_calibration)
+      .type("FILE");
   command
-      ->add_option("--times", a->files.times,
-                   "Times of KITTI poses; otherwise times.txt beside them or in "
-                   "../sequences/NAME")
-      ->type_name("FILE");
+      .option("--times",
+              "Times of KITTI poses; otherwise times.txt beside them or in ../sequences/NAME",
+              &a->files.times)
+      .type("FILE");
   command
-      ->add_option("--lengths", a->options.lengths,
-                   "Lengths of the pieces [m]; otherwise 100..800, 10..80 or 1..8 as the path "
-                   "allows")
-      ->delimiter(',')
-      ->check(CLI::PositiveNumber);
-  command->add_option("--step", a->options.step, "Every N-th frame starts a piece; 1 for clips")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+      .option("--lengths",
+              "Lengths of the pieces [m]; otherwise 100..800, 10..80 or 1..8 as the path allows",
+              &a->options.lengths)
+      .comma_separated()
+      .positive();
+  command.option("--step", "Every N-th frame starts a piece; 1 for clips", &a->options.step)
+      .positive()
+      .show_default();
   command
-      ->add_option("--tolerance", a->options.tolerance_s,
-                   "Between stamps [s]; otherwise half the shorter period, at most 0.02")
-      ->check(CLI::PositiveNumber);
+      .option("--tolerance", "Between stamps [s]; otherwise half the shorter period, at most 0.02",
+              &a->options.tolerance_s)
+      .positive();
   command
-      ->add_option("--frames", a->options.frames,
-                   "Frames that were fed, for completion; otherwise those of the truth")
-      ->check(CLI::PositiveNumber);
+      .option("--frames", "Frames that were fed, for completion; otherwise those of the truth",
+              &a->options.frames)
+      .positive();
   command
-      ->add_option("--scale-length", a->options.scale_length,
-                   "Displacement for the scale error [m]; otherwise 10 driving, 0.5 hand-held")
-      ->check(CLI::PositiveNumber);
+      .option("--scale-length",
+              "Displacement for the scale error [m]; otherwise 10 driving, 0.5 hand-held",
+              &a->options.scale_length)
+      .positive();
   command
-      ->add_option("--keyframes", a->files.keyframes,
-                   "The run's --keyframes file: scale error from keyframe to keyframe")
-      ->type_name("FILE.csv");
-  command->add_option("--json", a->json, "Write all numbers")->type_name("FILE.json");
-  command->add_option("--plot", a->plot, "Write trajectory and error plots")->type_name("FILE.svg");
+      .option("--keyframes", "The run's --keyframes file: scale error from keyframe to keyframe",
+              &a->files.keyframes)
+      .type("FILE.csv");
+  command.option("--json", "Write all numbers", &a->json).type("FILE.json");
+  command.option("--plot", "Write trajectory and error plots", &a->plot).type("FILE.svg");
 }
 
 /// "est.txt against groundtruth.txt": the folders would not fit.
@@ -88,12 +90,12 @@ int evaluate_files(const EvalArguments& a) {
 
 }  // namespace
 
-void add_eval_command(CLI::App& app, int* exit_code) {
+void add_eval_command(const Command& program) {
   auto arguments = std::make_shared<EvalArguments>();
-  CLI::App* command = app.add_subcommand("eval", "Measure a trajectory against the truth");
-  command->footer(kExitCodesHelp);
+  const Command command = program.add_command("eval", "Measure a trajectory against the truth");
+  command.footer(kExitCodesHelp);
   add_options(command, arguments.get());
-  command->callback([arguments, exit_code] { *exit_code = evaluate_files(*arguments); });
+  command.action([arguments] { return evaluate_files(*arguments); });
 }
 
 }  // namespace sovo::app

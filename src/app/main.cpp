@@ -7,46 +7,35 @@
 
 namespace {
 
-void add_global_options(CLI::App& app) {
-  app.set_version_flag("--version", "sovo " SOVO_VERSION);
-  app.add_option("--config", "YAML file with a section for each process; `sovo config` prints one")
-      ->type_name("FILE.yaml");
-  app.add_option("--set", "Override one key of the configuration, KEY=VALUE; may be repeated")
-      ->type_name("KEY=VALUE")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-      ->take_all();
-  app.add_option_function<std::string>("--log-level", sovo::app::set_up_logging,
-                                       "How much is logged to stderr")
-      ->check(CLI::IsMember(sovo::app::log_levels()))
-      ->default_str("info");
+using sovo::app::Command;
+
+void add_global_options(const Command& root) {
+  root.option("--config", "YAML file with a section for each process; `sovo config` prints one")
+      .type("FILE.yaml");
+  root.option("--set", "Override one key of the configuration, KEY=VALUE; may be repeated")
+      .type("KEY=VALUE")
+      .repeatable();
+  root.option("--log-level", "How much is logged to stderr", sovo::app::set_up_logging)
+      .one_of(sovo::app::log_levels())
+      .show_default("info");
 }
 
 int run(int argc, char** argv) {
   using namespace sovo::app;
-  CLI::App app("Scaled visual odometry from a stereo camera, on DDS.");
-  app.name("sovo");
-  app.footer(kExitCodesHelp);
-  app.require_subcommand(1);
-  app.fallthrough();
-  add_global_options(app);
+  Program program("sovo", "Scaled visual odometry from a stereo camera, on DDS.", SOVO_VERSION);
+  const Command root = program.root();
+  root.footer(kExitCodesHelp);
+  add_global_options(root);
   set_up_logging("info");
-
-  int exit_code = kOk;
-  add_run_command(app, &exit_code);
-  add_camera_command(app, &exit_code);
-  add_vo_command(app, &exit_code);
-  add_status_command(app, &exit_code);
-  add_command_command(app, &exit_code);
-  add_eval_command(app, &exit_code);
-  add_calib_command(app, &exit_code);
-  add_config_command(app, &exit_code);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kOk : kUsage;
-  }
-  return exit_code;
+  add_run_command(root);
+  add_camera_command(root);
+  add_vo_command(root);
+  add_status_command(root);
+  add_command_command(root);
+  add_eval_command(root);
+  add_calib_command(root);
+  add_config_command(root);
+  return program.run(argc, argv);
 }
 
 }  // namespace

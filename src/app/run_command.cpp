@@ -5,8 +5,8 @@
 
 #include "sovo/app/commands.h"
 #include "sovo/app/config_options.h"
-#include "sovo/app/dataset_input.h"
 #include "sovo/app/failure.h"
+#include "sovo/app/frame_input.h"
 #include "sovo/app/odometry_session.h"
 #include "sovo/app/progress.h"
 #include "sovo/app/stop_signal.h"
@@ -15,7 +15,7 @@ namespace sovo::app {
 namespace {
 
 /// Feeds every frame until the source ends or the user stops; false when the source broke.
-bool feed(DatasetSource& source, OdometrySession& session, StopSignal& stop) {
+bool feed(FrameSource& source, OdometrySession& session, StopSignal& stop) {
   Progress progress(source.size());
   while (!stop.requested()) {
     const SourceResult next = source.next(std::chrono::milliseconds(100));
@@ -42,35 +42,40 @@ bool feed(DatasetSource& source, OdometrySession& session, StopSignal& stop) {
   return true;
 }
 
-int run(AppConfig config) {
-  if (config.camera.path.empty()) return fail(kUsage, "no dataset given; use --dataset FOLDER");
+int run(AppConfig config, bool simulated) {
+  if (!simulated && config.camera.path.empty()) {
+    return fail(kUsage,
+                "no source given; use --dataset FOLDER, or --world NAME for a simulated one");
+  }
   if (auto writable = check_outputs(config.output); !writable) {
     return fail(kUsage, writable.error());
   }
   StopSignal stop;  // before the threads of source and odometry
-  auto source = open_dataset_input(config.camera, 0.0);
-  if (!source) return fail(kBadInput, source.error());
-  DatasetSource& dataset = **source;
+  auto input =
+      simulated ? open_sim_input(config, 0.0, true) : open_dataset_input(config.camera, 0.0);
+  if (!input) return fail(kBadInput, input.error());
   // As fast as can be means that the source waits for the odometry and nothing is dropped.
-  if (*parse_rate(config.camera.rate, 0.0) == 0.0) config.odometry.wait_for_mapping = true;
-  OdometrySession session(config, to_cameras(dataset.calibration()));
-  const bool source_ok = feed(dataset, session, stop);
-  const int code =
-      session.finish([&dataset](std::int64_t fed) { return dataset.original_stamp(fed); });
+  if (input->rate == 0.0) config.odometry.wait_for_mapping = true;
+  OdometrySession session(config, input->cameras);
+  const bool source_ok = feed(*input->source, session, stop);
+  const int code = session.finish(input->original_stamp);
   return source_ok ? code : kBadInput;
 }
 
 }  // namespace
 
-void add_run_command(CLI::App& app, int* exit_code) {
-  CLI::App* command = app.add_subcommand("run", "Run the odometry on a dataset, in one process");
+void add_run_command(const Command& program) {
+  const Command command = program.add_command(
+      "run", "Run the odometry on a dataset or a simulated world, in one process");
   auto options = std::make_shared<ConfigOptions>(command);
-  options->value("--dataset", "camera.path", "Folder of the dataset", "DIR");
+  options->value("--dataset", "camera.path", "Folder of the dataset", "DIR")
+      .value("--rate", "camera.rate", "Speed: 1.0 is real time, max as fast as can be", "X|max");
+  add_sim_options(*options);
   add_dataset_options(*options);
   add_odometry_options(*options);
-  command->callback([options, exit_code] {
+  command.action([options] {
     const auto config = options->load();
-    *exit_code = config ? run(*config) : fail(kUsage, config.error());
+    return config ? run(*config, options->is_given("--world")) : fail(kUsage, config.error());
   });
 }
 

@@ -1,17 +1,14 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <vector>
 
 #include "sovo/app/app_config.h"
+#include "sovo/app/frame_input.h"
 #include "sovo/app/profile_report.h"
 #include "sovo/io/result.h"
 
 namespace sovo::app {
-
-/// Brings a stamp that the odometry saw back to the one of the dataset.
-using StampMap = std::function<std::int64_t(std::int64_t)>;
 
 /// Everything that a run leaves.
 struct RunResults {

@@ -102,16 +102,16 @@ int watch(const AppConfig& config, const StatusOptions& options) {
 
 }  // namespace
 
-void add_status_command(CLI::App& app, int* exit_code) {
-  CLI::App* command = app.add_subcommand("status", "Show the state of the odometry process");
+void add_status_command(const Command& program) {
+  const Command command = program.add_command("status", "Show the state of the odometry process");
   auto status = std::make_shared<StatusOptions>();
-  command->add_flag("--once", status->once, "Show the next state and end");
-  command->add_flag("--json", status->json, "One line of JSON a state");
+  command.flag("--once", "Show the next state and end", &status->once);
+  command.flag("--json", "One line of JSON a state", &status->json);
   auto options = std::make_shared<ConfigOptions>(command);
   add_dds_options(*options);
-  command->callback([options, status, exit_code] {
+  command.action([options, status] {
     const auto config = options->load();
-    *exit_code = config ? watch(*config, *status) : fail(kUsage, config.error());
+    return config ? watch(*config, *status) : fail(kUsage, config.error());
   });
 }
 

@@ -5,8 +5,8 @@
 
 #include "sovo/app/commands.h"
 #include "sovo/app/config_options.h"
-#include "sovo/app/dataset_input.h"
 #include "sovo/app/failure.h"
+#include "sovo/app/frame_input.h"
 #include "sovo/app/odometry_session.h"
 #include "sovo/app/stop_signal.h"
 #include "sovo/bridge/command_subscriber.h"
@@ -219,8 +219,9 @@ int run(const AppConfig& config) {
 
 }  // namespace
 
-void add_vo_command(CLI::App& app, int* exit_code) {
-  CLI::App* command = app.add_subcommand("vo", "The odometry process: stereo in, odometry out");
+void add_vo_command(const Command& program) {
+  const Command command =
+      program.add_command("vo", "The odometry process: stereo in, odometry out");
   auto options = std::make_shared<ConfigOptions>(command);
   options
       ->value("--calib", "camera.calibration", "Calibration file, instead of the camera's", "FILE")
@@ -228,9 +229,9 @@ void add_vo_command(CLI::App& app, int* exit_code) {
       .value("--idle-exit", "node.idle_exit_s", "End when no frame came this long", "SECONDS");
   add_odometry_options(*options);
   add_dds_options(*options);
-  command->callback([options, exit_code] {
+  command.action([options] {
     const auto config = options->load();
-    *exit_code = config ? run(*config) : fail(kUsage, config.error());
+    return config ? run(*config) : fail(kUsage, config.error());
   });
 }
 

@@ -56,6 +56,33 @@ TEST(MotionTest, LanesOfThePoolAre3600MillimetresApart) {
   EXPECT_NEAR(y, 3 * 3.6, 0.02);
 }
 
+/// No trajectory of the worlds jumps, turns on the spot like a machine, or dives into the ground.
+TEST(MotionTest, OwnTrajectoriesAreOnesThatVehiclesCouldFollow) {
+  for (const World world : {World::kLawn, World::kPool, World::kStreet, World::kHall}) {
+    for (const std::string& name : own_trajectories(world)) {
+      const Motion motion = own_motion(world, name);
+      constexpr double h = 0.05;
+      for (double t = 0.0; t + h < motion.duration_s(); t += h) {
+        const SE3 step = motion.at(t).inverse() * motion.at(t + h);
+        EXPECT_LT(step.translation().norm() / h, 23.0) << name << " at " << t;
+        EXPECT_LT(step.rotation().log().norm() / h, 3.4) << name << " at " << t;
+        EXPECT_GT(motion.at(t).translation().z(), 0.3) << name << " at " << t;
+      }
+    }
+  }
+  EXPECT_GT(own_motion(World::kStreet, "town").length_m(), 300.0);
+  EXPECT_GT(own_motion(World::kStreet, "expressway").length_m(), 500.0);
+}
+
+TEST(MotionTest, TheRaceEndsInStandstill) {
+  const Motion race = own_motion(World::kHall, "race");
+  const double end = race.duration_s();
+  const SE3 moved = race.at(end - 5.0).inverse() * race.at(end);
+  EXPECT_LT(moved.translation().norm(), 1e-6);
+  EXPECT_LT((race.at(13.0).inverse() * race.at(13.1)).translation().norm(), 0.6);
+  EXPECT_GT((race.at(13.0).inverse() * race.at(13.1)).translation().norm(), 0.1);
+}
+
 /// A drive in the frame of its first camera, as KITTI has it, comes to lie level with z up; a
 /// flight of EuRoC's body, whose x axis is up, keeps the world and gets the camera.
 TEST(MotionTest, FilesOfOtherConventionsAreBroughtIntoTheWorld) {

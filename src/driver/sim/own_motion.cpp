@@ -1,7 +1,7 @@
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include "sovo/driver/sim/world.h"
@@ -84,26 +84,17 @@ Motion mow_pool() {
   });
 }
 
-/// A drive of 470 m through a town, at up to 9 m/s, slower in the corners.
-Motion drive_street() {
-  const auto way = walk({{90.0, 0.0},
-                         {40.0, 0.5},
-                         {50.0, 0.0},
-                         {28.0, -0.5 * kPi},
-                         {70.0, 0.0},
-                         {40.0, 0.4},
-                         {40.0, -0.4},
-                         {30.0, 0.5 * kPi},
-                         {80.0, 0.0}},
-                        0.1);
-  // Time along the way, with a speed that follows the curvature.
+/// A drive along `way` at up to `fastest` m/s, slower by up to `slower` in the bends, braking
+/// `foresight` metres ahead.
+Motion drive(const std::vector<WayPoint>& way, double fastest, double slower, double foresight) {
   std::vector<double> times{0.0};
-  double speed = 4.0;
+  double speed = 0.5 * fastest;
+  const auto samples_ahead = static_cast<std::size_t>(foresight / (way[1].s - way[0].s));
   for (std::size_t i = 1; i < way.size(); ++i) {
     const double ds = way[i].s - way[i - 1].s;
-    const std::size_t ahead = std::min(way.size() - 1, i + 80);
+    const std::size_t ahead = std::min(way.size() - 1, i + samples_ahead);
     const double bend = std::abs(way[ahead].heading - way[i].heading);
-    const double wanted = 9.0 - 4.5 * std::min(1.0, bend / 0.6);
+    const double wanted = fastest - slower * std::min(1.0, bend / 0.6);
     speed += (wanted - speed) * 0.15 * ds;
     times.push_back(times.back() + ds / speed);
   }
@@ -120,21 +111,41 @@ Motion drive_street() {
   });
 }
 
-/// Loops of a small aircraft through a hall of about 20 m by 12 m.
-Motion fly_hall() {
-  const auto position = [](double t) {
-    const double a = 0.26 * t;
-    return Vec3(6.5 * std::sin(a) + 0.8 * std::sin(3.1 * a), 3.4 * std::sin(2.0 * a + 0.5),
-                1.9 + 0.7 * std::sin(1.7 * a + 0.4) + 0.25 * std::sin(4.3 * a));
-  };
-  return sampled(60.0, [position](double t) {
+/// 470 m through a town, at up to 9 m/s, slower in the corners.
+Motion drive_town() {
+  const auto way = walk({{90.0, 0.0},
+                         {40.0, 0.5},
+                         {50.0, 0.0},
+                         {28.0, -0.5 * kPi},
+                         {70.0, 0.0},
+                         {40.0, 0.4},
+                         {40.0, -0.4},
+                         {30.0, 0.5 * kPi},
+                         {80.0, 0.0}},
+                        0.1);
+  return drive(way, 9.0, 4.5, 8.0);
+}
+
+/// 600 m at up to 22 m/s through wide bends: few pairs see a point.
+Motion drive_expressway() {
+  const auto way =
+      walk({{150.0, 0.0}, {140.0, 0.7}, {120.0, 0.0}, {110.0, -0.6}, {80.0, 0.0}}, 0.1);
+  return drive(way, 22.0, 8.0, 20.0);
+}
+
+/// A flight of a small aircraft along the curve `path`, whose parameter at a time is `phase`: it
+/// looks along the curve, `ahead` to `behind` of it, and leans as it speeds up and turns.
+template <class Path, class Phase>
+Motion fly(double duration, Path path, Phase phase, double ahead, double behind) {
+  return sampled(duration, [=](double t) {
     constexpr double h = 0.05;
+    const auto position = [&](double time) { return path(phase(time)); };
     const Vec3 p = position(t);
     const Vec3 velocity = (position(t + h) - position(t - h)) / (2.0 * h);
     const Vec3 acceleration = (position(t + h) - 2.0 * p + position(t - h)) / (h * h);
-    // It looks where it will be, and leans into its turns.
-    const Vec3 ahead = position(t + 1.2) - position(t - 0.6);
-    const double yaw = std::atan2(ahead.y(), ahead.x());
+    // It looks where it will be.
+    const Vec3 course = path(phase(t) + ahead) - path(phase(t) - behind);
+    const double yaw = std::atan2(course.y(), course.x());
     const double side = -std::sin(yaw) * acceleration.x() + std::cos(yaw) * acceleration.y();
     const double forward = std::cos(yaw) * acceleration.x() + std::sin(yaw) * acceleration.y();
     const double roll = -std::atan(side / 9.81) + 0.015 * std::sin(5.0 * t);
@@ -144,72 +155,84 @@ Motion fly_hall() {
   });
 }
 
-CameraModel camera(double f, Distortion distortion, std::array<double, 4> d, double dx, double dy) {
-  CameraModel c;
-  c.width = 640;
-  c.height = 400;
-  c.fx = f;
-  c.fy = f;
-  c.cx = 319.5 + dx;
-  c.cy = 199.5 + dy;
-  c.distortion = distortion;
-  if (distortion != Distortion::kNone) {
-    for (std::size_t i = 0; i < d.size(); ++i) c.d[i] = d[i];
-    c.num_coefficients = 4;
+/// A closed curve through a hall of about 20 m by 12 m; once around is 24 units of `u`.
+Vec3 loop_of_hall(double u) {
+  const double a = 0.26 * u;
+  return {6.5 * std::sin(a) + 0.8 * std::sin(3.1 * a), 3.4 * std::sin(2.0 * a + 0.5),
+          1.9 + 0.7 * std::sin(1.7 * a + 0.4) + 0.25 * std::sin(4.3 * a)};
+}
+
+/// Loops at up to 2.5 m/s.
+Motion fly_loops() {
+  return fly(
+      60.0, loop_of_hall, [](double t) { return t; }, 1.2, 0.6);
+}
+
+/// Where the race is on the loops after `t` seconds: half as fast again as `fly_loops`, then a
+/// sudden end.
+double phase_of_race(double t) {
+  constexpr double kRamp = 2.0;    // [s]
+  constexpr double kBrake = 26.0;  // [s]
+  constexpr double kStop = 28.5;
+  const double start = std::min(t, kRamp);
+  const double brake = std::clamp(t, kBrake, kStop) - kBrake;
+  const double run = std::min(t, kBrake) - start;
+  return 1.5 * (0.5 * start * start / kRamp + run + brake - 0.5 * brake * brake / (kStop - kBrake));
+}
+
+/// Fast loops that end in standstill for the last six seconds.
+Motion fly_race() { return fly(34.5, loop_of_hall, phase_of_race, 2.2, 1.8); }
+
+/// From machine to machine, with a stop at each of them, looking around all the while.
+Motion fly_inspection() {
+  return sampled(60.0, [](double t) {
+    constexpr double kStops = 0.5;  // [rad/s]
+    const double a = 0.13 * (t - 0.97 * std::sin(kStops * t) / kStops);
+    const Vec3 position(4.5 * std::sin(a), 2.6 * std::sin(2.0 * a + 0.4),
+                        1.6 + 0.5 * std::sin(1.3 * a) + 0.02 * std::sin(1.1 * t));
+    const double yaw = 1.9 * std::sin(0.9 * a + 0.3) + 0.35 * std::sin(0.27 * t);
+    return SE3(looking(yaw, 0.1 + 0.08 * std::sin(0.4 * t), 0.03 * std::sin(0.9 * t)), position);
+  });
+}
+
+struct NamedMotion {
+  std::string name;
+  Motion (*make)();
+};
+
+const std::vector<NamedMotion>& motions_of(World world) {
+  static const std::vector<NamedMotion> kLawn{{"square", walk_square}};
+  static const std::vector<NamedMotion> kPool{{"lanes", mow_pool}};
+  static const std::vector<NamedMotion> kStreet{{"town", drive_town},
+                                                {"expressway", drive_expressway}};
+  static const std::vector<NamedMotion> kHall{
+      {"loops", fly_loops}, {"inspection", fly_inspection}, {"race", fly_race}};
+  switch (world) {
+    case World::kLawn:
+      return kLawn;
+    case World::kPool:
+      return kPool;
+    case World::kStreet:
+      return kStreet;
+    case World::kHall:
+      break;
   }
-  return c;
+  return kHall;
 }
 
 }  // namespace
 
-Motion own_motion(World world) {
-  switch (world) {
-    case World::kLawn:
-      return walk_square();
-    case World::kPool:
-      return mow_pool();
-    case World::kStreet:
-      return drive_street();
-    case World::kHall:
-      break;
-  }
-  return fly_hall();
+std::vector<std::string> own_trajectories(World world) {
+  std::vector<std::string> names;
+  for (const NamedMotion& motion : motions_of(world)) names.push_back(motion.name);
+  return names;
 }
 
-StereoRig own_rig(World world) {
-  StereoRig rig;
-  rig.name = "sim_" + std::string(enum_names(world)[static_cast<std::size_t>(world)].second);
-  const auto place_right = [&rig](double baseline, const Vec3& turn) {
-    rig.T_right_left = SE3(SO3::exp(turn), Vec3(-baseline, 0.0, 0.0));
-  };
-  switch (world) {
-    case World::kLawn:  // a stereo camera in the hand
-      rig.left = camera(350.0, Distortion::kNone, {}, 0.0, 0.0);
-      rig.right = camera(352.0, Distortion::kNone, {}, 3.0, -2.0);
-      place_right(0.12, {0.004, -0.006, 0.003});
-      break;
-    case World::kPool:  // wide lenses behind flat glass
-      rig.left = camera(300.0, Distortion::kEquidistant, {-0.012, 0.004, -0.003, 0.0006}, 2.0, 1.0);
-      rig.right =
-          camera(301.0, Distortion::kEquidistant, {-0.010, 0.003, -0.002, 0.0005}, -3.0, 2.0);
-      place_right(0.18, {-0.003, 0.005, 0.002});
-      break;
-    case World::kStreet:  // rectified, on a car's roof
-      rig.left = camera(380.0, Distortion::kNone, {}, 0.0, -20.0);
-      rig.right = rig.left;
-      place_right(0.5, Vec3::Zero());
-      break;
-    case World::kHall:  // on a small aircraft
-      rig.left = camera(345.0, Distortion::kRadtan, {-0.283, 0.074, 0.0002, 0.00002}, -6.0, 5.0);
-      rig.right = camera(344.0, Distortion::kRadtan, {-0.281, 0.073, -0.0001, 0.00003}, 5.0, 8.0);
-      place_right(0.11, {0.007, 0.002, -0.004});
-      break;
-  }
-  return rig;
-}
-
-double own_frame_rate(World world) {
-  return world == World::kLawn || world == World::kHall ? 20.0 : 10.0;
+Motion own_motion(World world, const std::string& name) {
+  const auto& motions = motions_of(world);
+  const auto found = std::find_if(motions.begin(), motions.end(),
+                                  [&name](const NamedMotion& m) { return m.name == name; });
+  return found == motions.end() ? motions.front().make() : found->make();
 }
 
 }  // namespace sovo::sim

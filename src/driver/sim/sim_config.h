@@ -88,40 +88,37 @@ struct SensorConfig {
   }
 };
 
-/// Simulated cameras in a world.
+/// Simulated cameras in a world. The file's section has what describes the world and the cameras;
+/// which pairs are asked for, and when, is said by who opens the source.
 struct SimConfig {
   World world = World::kLawn;
   std::uint64_t seed = 1;
-  int frames = 0;
   double frame_rate = 0.0;
-  bool real_time = false;
-  bool restamp = false;
-  bool reverse = false;
-  std::string calibration;
   std::string trajectory;
   std::string trajectory_times;
   TrajectoryBody trajectory_body = TrajectoryBody::kAuto;
-  double start_s = 0.0;
   int threads = 2;
-  std::string frame_id = "cam_left_camera_optical_frame";
   SensorConfig sensor;
+
+  std::string calibration;  ///< File of the cameras; empty: the world's own.
+  int start = 0;            ///< Pairs left out at the beginning.
+  int frames = 0;           ///< Pairs at most; 0: to the end of the trajectory.
+  double rate = 0.0;        ///< Speed against the world's time; 0: as fast as they are rendered.
+  bool reverse = false;     ///< The trajectory is flown backwards.
+  bool restamp = false;     ///< Stamps begin now (UTC), not in 2020 or with the trajectory file.
+  std::string frame_id = "cam_left_camera_optical_frame";
 
   template <class Visitor>
   void visit(Visitor& v) {
     v("world", world, "lawn, pool, street or hall");
     v("seed", seed, "of the world and the noise");
-    v("frames", frames, "pairs at most; 0: to the end of the trajectory");
     v("frame_rate", frame_rate, "pairs a second of the world's time [Hz]; 0: what suits it");
-    v("real_time", real_time, "give pairs at their rate, not as fast as they are rendered");
-    v("restamp", restamp, "stamps begin now, not in 2020 or with the trajectory file");
-    v("reverse", reverse, "fly the trajectory backwards");
-    v("calibration", calibration, "calibration file of the cameras; empty: the world's own");
-    v("trajectory", trajectory, "TUM, EuRoC or KITTI poses; empty: the world's own trajectory");
+    v("trajectory", trajectory,
+      "one of the world's own by its name, or a file of TUM, EuRoC or KITTI poses; empty: the "
+      "world's first");
     v("trajectory_times", trajectory_times, "KITTI times file of the trajectory");
-    v("trajectory_body", trajectory_body, "of which body the trajectory's poses are");
-    v("start_s", start_s, "time of the trajectory left out at the beginning [s]");
+    v("trajectory_body", trajectory_body, "of which body the trajectory file's poses are");
     v("threads", threads, "1 or 2: cameras rendered at once; changes no pixel");
-    v("frame_id", frame_id, "name of the left optical frame");
     v("sensor", sensor, "what the cameras do to the light");
   }
 };

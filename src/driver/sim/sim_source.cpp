@@ -20,13 +20,14 @@ std::int64_t utc_now_ns() {
 
 /// Pairs of the trajectory that the configuration asks for and that are not dropped.
 std::vector<std::size_t> choose_pairs(const SimConfig& config, const Motion& motion, double rate) {
-  const double span = std::max(0.0, motion.duration_s() - config.start_s);
+  const auto start = static_cast<std::size_t>(config.start);
+  const double span = std::max(0.0, motion.duration_s() - config.start / rate);
   auto count = static_cast<std::size_t>(std::floor(span * rate + 1e-6)) + 1;
   if (config.frames > 0) count = std::min(count, static_cast<std::size_t>(config.frames));
   std::vector<std::size_t> pairs;
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = start; i < start + count; ++i) {
     // The first pair is never dropped.
-    const bool dropped = i > 0 && unit(combine(config.seed + 77, i)) < config.sensor.drop_rate;
+    const bool dropped = i > start && unit(combine(config.seed + 77, i)) < config.sensor.drop_rate;
     if (!dropped) pairs.push_back(i);
   }
   return pairs;
@@ -41,13 +42,26 @@ Vec6 velocity_of(const SE3& before, const SE3& after, double dt) {
   return velocity;
 }
 
+/// One of the world's own trajectories, or a file.
+Result<Motion> find_motion(const SimConfig& config, const StereoRig& rig) {
+  const auto names = own_trajectories(config.world);
+  const bool own = config.trajectory.empty() ||
+                   std::find(names.begin(), names.end(), config.trajectory) != names.end();
+  if (own) return own_motion(config.world, config.trajectory);
+  auto motion = load_motion(config, rig);
+  if (motion) return motion;
+  std::string known;
+  for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
+  return Error{motion.error() + "; the world's own trajectories are: " + known};
+}
+
 Result<void> check(const SimConfig& config) {
   const SensorConfig& s = config.sensor;
   if (config.frames < 0) return Error{"frames must not be negative"};
   if (config.frame_rate < 0.0 || config.frame_rate > 1000.0) {
     return Error{"frame_rate must be at most 1000 Hz, or 0 for the world's own"};
   }
-  if (config.start_s < 0.0) return Error{"start_s must not be negative"};
+  if (config.start < 0) return Error{"start must not be negative"};
   if (s.vignette < 0.0 || s.vignette > 0.9) return Error{"sensor.vignette must be in [0, 0.9]"};
   if (!(s.response_gamma >= 0.2 && s.response_gamma <= 5.0)) {
     return Error{"sensor.response_gamma must be in [0.2, 5]"};
@@ -77,19 +91,18 @@ SimSource::SimSource(const SimConfig& config, Calibration calibration, Motion mo
       right_exposure_(config.sensor, scene_.exposure_s) {
   calibration_.left_photometric = left_sensor_.photometric();
   calibration_.right_photometric = right_sensor_.photometric();
-  if (config.restamp) shift_ns_ = utc_now_ns() - stamp_of(0);
+  if (config.restamp) shift_ns_ = utc_now_ns() - stamp_of(delivered_.front());
   decoder_ = std::make_unique<FrameDecoder>(delivered_.size(),
                                             [this](std::size_t n) { return render(n); });
 }
 
-/// Time since the first pair [s].
+/// Time since the trajectory began [s].
 double SimSource::time_of(std::size_t index) const {
   return static_cast<double>(index) / frame_rate_;
 }
 
 std::int64_t SimSource::stamp_of(std::size_t index) const {
-  const double t = config_.start_s + time_of(index);
-  return motion_.first_ns() + static_cast<std::int64_t>(std::llround(1e9 * t));
+  return motion_.first_ns() + static_cast<std::int64_t>(std::llround(1e9 * time_of(index)));
 }
 
 /// Time on the trajectory at a stamp that was not shifted [s].
@@ -198,8 +211,11 @@ SourceResult SimSource::next(std::chrono::milliseconds timeout) {
     if (result.state != SourceState::kFrame) return result;
     waiting_ = std::move(result);
   }
-  if (config_.real_time) {
-    const auto since = std::chrono::nanoseconds(waiting_->frame.stamp_ns - shift_ns_ - stamp_of(0));
+  if (config_.rate > 0.0) {
+    const std::int64_t since_first =
+        waiting_->frame.stamp_ns - shift_ns_ - stamp_of(delivered_.front());
+    const std::chrono::nanoseconds since(
+        std::llround(static_cast<double>(since_first) / config_.rate));
     if (!std::exchange(begun_, true)) start_ = std::chrono::steady_clock::now() - since;
     const auto due = start_ + since;
     std::this_thread::sleep_until(std::min(due, deadline));
@@ -253,11 +269,13 @@ Result<std::unique_ptr<SimSource>> open_sim(const SimConfig& config) {
       return Error{config.calibration + ": has no image size; give a calibration that has one"};
     }
   }
-  if (config.trajectory.empty()) {
-    return std::make_unique<SimSource>(config, calibration, own_motion(config.world));
-  }
-  auto motion = load_motion(config, calibration.rig);
+  auto motion = find_motion(config, calibration.rig);
   if (!motion) return motion.failure();
+  const double rate = config.frame_rate > 0.0 ? config.frame_rate : own_frame_rate(config.world);
+  if (config.start / rate > motion->duration_s()) {
+    return Error{"the trajectory ends after " + std::to_string(motion->duration_s()) +
+                 " s; there is no pair " + std::to_string(config.start)};
+  }
   return std::make_unique<SimSource>(config, std::move(calibration), std::move(*motion));
 }
 

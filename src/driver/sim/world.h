@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "sovo/driver/sim/motion.h"
 #include "sovo/driver/sim/scene.h"
@@ -10,8 +11,12 @@
 
 namespace sovo::sim {
 
-/// The motion of the left camera that belongs to a world; z is up, the ground at z = 0.
-Motion own_motion(World world);
+/// Names of the trajectories that belong to a world; the first is the one it is known for.
+std::vector<std::string> own_trajectories(World world);
+
+/// The motion of the left camera along one of them; z is up, the ground at z = 0. Precondition:
+/// `name` is one of `own_trajectories`, or empty for the first.
+Motion own_motion(World world, const std::string& name = {});
 
 /// Cameras that suit a world.
 StereoRig own_rig(World world);

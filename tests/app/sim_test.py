@@ -1,0 +1,112 @@
+"""Simulated cameras: `sovo camera sim`, `sovo run --world`."""
+
+import time
+
+import harness
+from bus_test import BusTest
+from harness import BAD_INPUT, OK, USAGE, CommandTest, largest_error, read_tum, sovo
+
+CALIBRATION = """\
+sovo_calibration: 1
+name: small
+left: {width: 320, height: 200, fx: 175, fy: 175, cx: 159.5, cy: 99.5}
+right: {width: 320, height: 200, fx: 176, fy: 176, cx: 161, cy: 98.5}
+T_right_left: [1, 0, 0, -0.12, 0, 1, 0, 0, 0, 0, 1, 0]
+"""
+FRAMES = 16
+
+
+class SimTest(CommandTest):
+    def setUp(self):
+        super().setUp()
+        self.calibration = self.folder / "small.yaml"
+        self.calibration.write_text(CALIBRATION)
+
+    def world(self, name, *options):
+        return ("--world", name, "--calib", self.calibration, "--frames", FRAMES, *options)
+
+
+class SimulatedRun(SimTest):
+    def run_world(self, name, *options):
+        truth, out = self.folder / "truth.txt", self.folder / "out.txt"
+        self.expect(sovo("run", "--deterministic", *self.world(name), "--truth", truth,
+                         "--out", out, *options), OK)
+        return read_tum(truth), read_tum(out), out.read_bytes()
+
+    def test_true_to_centimetres_and_the_same_again(self):
+        truth, poses, first = self.run_world("lawn")
+        self.assertEqual([p[0] for p in poses], [p[0] for p in truth])
+        self.assertEqual(len(poses), FRAMES)
+        self.assertLess(largest_error(poses, truth, poses[0][0]), 0.03)
+        self.assertEqual(first, self.run_world("lawn")[2])
+
+    def test_backwards_has_the_stamps_of_the_trajectory(self):
+        truth, poses, _ = self.run_world("lawn", "--reverse")
+        self.assertEqual([p[0] for p in poses], [p[0] for p in truth])
+        # What was fed first is the last of the trajectory.
+        self.assertEqual(poses[-1][1:], ([0, 0, 0], [0, 0, 0, 1]))
+        self.assertLess(largest_error(poses, truth, poses[-1][0]), 0.03)
+
+
+class SimulatedExport(SimTest):
+    def test_what_is_exported_runs_like_the_world_itself(self):
+        folder, out, again = (self.folder / n for n in ("dataset", "out.txt", "again.txt"))
+        self.expect(sovo("camera", "sim", *self.world("lawn"), "--export", folder, "--depth"), OK)
+        images = sorted((folder / "mav0/cam0/data").glob("*.png"))
+        self.assertEqual(len(images), FRAMES)
+        self.assertEqual(len(list((folder / "depth").glob("*.pfm"))), FRAMES)
+        truth = read_tum(folder / "groundtruth_cam0_tum.txt")
+        self.assertEqual(len(truth), FRAMES)
+        self.expect(sovo("run", "--deterministic", "--dataset", folder, "--out", out), OK)
+        self.expect(sovo("run", "--deterministic", *self.world("lawn"), "--out", again), OK)
+        # The file of the vignette has 16 bits: equal but for rounding.
+        poses, world = read_tum(out), read_tum(again)
+        self.assertLess(largest_error(poses, world, poses[0][0]), 1e-3)
+        report = self.expect(sovo("eval", "--gt", folder / "groundtruth_cam0_tum.txt",
+                                  "--est", out), OK)
+        self.assertIn("Completion 100.00 %", report.stdout)
+
+    def test_start_and_rate_choose_the_pairs(self):
+        stamps = {}
+        for name, options in {"all": (), "late": ("--start", 4), "slow": ("--rate", 10)}.items():
+            folder = self.folder / name
+            self.expect(sovo("camera", "sim", "--world", "lawn", "--calib", self.calibration,
+                             "--frames", 6, "--export", folder, *options), OK)
+            stamps[name] = [float(p[0]) for p in read_tum(folder / "groundtruth_cam0_tum.txt")]
+        self.assertEqual(stamps["late"][:2], stamps["all"][4:])
+        self.assertAlmostEqual(stamps["slow"][1] - stamps["slow"][0], 0.1, places=6)
+
+
+class SimulatedRefusals(SimTest):
+    def refused(self, code, words, *arguments):
+        result = self.expect(sovo(*arguments), code)
+        for word in words:
+            self.assertIn(word, result.stderr)
+
+    def test_reasons(self):
+        self.refused(USAGE, ["desert", "lawn"], "camera", "sim", "--world", "desert")
+        self.refused(USAGE, ["--export"], "camera", "sim", "--depth")
+        self.refused(USAGE, ["fast", "Hz"], "camera", "sim", "--rate", "fast")
+        self.refused(USAGE, ["--dataset", "--world"], "run")
+        self.refused(BAD_INPUT, ["/nowhere.txt", "town", "expressway"], "run", "--world", "street",
+                     "--trajectory", "/nowhere.txt")
+        self.refused(BAD_INPUT, ["no pair 100000"], "run", "--world", "hall", "--start", 100000)
+        self.refused(BAD_INPUT, ["cannot be written"], "run", *self.world("lawn"),
+                     "--truth", "/nowhere/truth.txt")
+
+
+class SimulatedBus(SimTest, BusTest):
+    def test_camera_and_odometry_as_processes(self):
+        truth, live = self.folder / "truth.txt", self.folder / "live.txt"
+        vo = self.start("vo", "--frames", FRAMES, "--out-live", live)
+        self.expect(sovo("camera", "sim", *self.bus, *self.world("lawn"), "--rate", "max",
+                         "--restamp", "--truth", truth), OK)
+        _, log = self.finish(vo)
+        poses, true_poses = read_tum(live), read_tum(truth)
+        self.assertEqual(len(poses), FRAMES, log)
+        self.assertLess(abs(float(poses[0][0]) - time.time()), 600)
+        self.assertLess(largest_error(poses, true_poses, poses[0][0]), 0.05)
+
+
+if __name__ == "__main__":
+    harness.main()

@@ -6,6 +6,7 @@ namespace sovo::app {
 
 // Each function adds one subcommand to the program's commands.
 
+void add_bench_command(const Command& program);
 void add_calib_command(const Command& program);
 void add_camera_command(const Command& program);
 void add_command_command(const Command& program);

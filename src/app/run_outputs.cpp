@@ -64,8 +64,8 @@ Result<void> check_writable(const std::string& file) {
 }  // namespace
 
 Result<void> check_outputs(const OutputSection& output) {
-  for (const std::string* file :
-       {&output.trajectory, &output.live_trajectory, &output.keyframes, &output.profile}) {
+  for (const std::string* file : {&output.trajectory, &output.live_trajectory, &output.keyframes,
+                                  &output.profile, &output.truth}) {
     if (file->empty()) continue;
     if (auto writable = check_writable(*file); !writable) return writable;
   }

@@ -1,5 +1,6 @@
 """Simulated cameras: `sovo camera sim`, `sovo run --world`."""
 
+import json
 import time
 
 import harness
@@ -93,6 +94,31 @@ class SimulatedRefusals(SimTest):
         self.refused(BAD_INPUT, ["no pair 100000"], "run", "--world", "hall", "--start", 100000)
         self.refused(BAD_INPUT, ["cannot be written"], "run", *self.world("lawn"),
                      "--truth", "/nowhere/truth.txt")
+
+
+class SyntheticBench(SimTest):
+    def test_a_row_a_case_and_the_numbers_as_json(self):
+        numbers = self.folder / "bench.json"
+        result = self.expect(sovo("bench", "synthetic", "--only", "lawn/square", "--calib",
+                                  self.calibration, "--frames", FRAMES, "--runs", 2,
+                                  "--json", numbers), OK)
+        lines = result.stdout.splitlines()
+        self.assertIn("ynthetic", lines[0])
+        self.assertEqual([line.split()[0] for line in lines[1:]],
+                         ["world/trajectory", "lawn/square", "lawn/square"])
+        runs = json.loads(numbers.read_text())
+        self.assertEqual([(r["case"], r["seed"]) for r in runs],
+                         [("lawn/square", 1), ("lawn/square", 2),
+                          ("lawn/square <", 1), ("lawn/square <", 2)])
+        for run in runs:
+            self.assertEqual(run["frames"], FRAMES)
+            self.assertEqual(run["completion"], 1.0)
+            self.assertLess(run["ate_m"], 0.02)
+            self.assertGreater(run["frame_ms"], 0.0)
+
+    def test_unknown_case_names_the_known(self):
+        result = self.expect(sovo("bench", "synthetic", "--only", "desert"), USAGE)
+        self.assertIn("street/expressway <", result.stderr)
 
 
 class SimulatedBus(SimTest, BusTest):

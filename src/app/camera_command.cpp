@@ -32,9 +32,9 @@ std::int64_t utc_now_ns() {
 /// Frames on their way to the bus.
 class Publication {
  public:
-  Publication(FrameSource& source, bridge::CameraPublisher& publisher, VoFollower& follower,
+  Publication(FrameInput& input, bridge::CameraPublisher& publisher, VoFollower& follower,
               StopSignal& stop)
-      : source_(source),
+      : input_(input),
         publisher_(publisher),
         follower_(follower),
         stop_([&stop] { return stop.requested(); }) {}
@@ -42,9 +42,10 @@ class Publication {
   /// Publishes everything; returns an exit code. `paced`: wait for the odometry.
   int run(std::uint64_t session, bool paced) {
     wait_for_listener();
-    Progress progress(source_.size());
+    if (auto begun = input_.begin(); !begun) return fail(kFailed, begun.error());
+    Progress progress(input_.source->size());
     while (!stop_()) {
-      SourceResult next = source_.next(std::chrono::milliseconds(100));
+      SourceResult next = input_.source->next(std::chrono::milliseconds(100));
       if (next.state == SourceState::kEndOfStream) break;
       if (next.state == SourceState::kFailed) return fail(kBadInput, next.message);
       if (next.state == SourceState::kBadFrame) spdlog::warn("frame left out: {}", next.message);
@@ -75,7 +76,7 @@ class Publication {
     }
   }
 
-  FrameSource& source_;
+  FrameInput& input_;
   bridge::CameraPublisher& publisher_;
   VoFollower& follower_;
   std::function<bool()> stop_;
@@ -99,7 +100,7 @@ int publish(const AppConfig& config, const std::function<Result<FrameInput>()>& 
   const std::uint64_t session = random_session();
   auto follower = VoFollower::open(*participant, session);
   if (!follower) return fail(kFailed, follower.error());
-  return Publication(*input->source, *publisher, *follower, stop).run(session, input->rate == 0.0);
+  return Publication(*input, *publisher, *follower, stop).run(session, input->rate == 0.0);
 }
 
 int publish_dataset(const AppConfig& config) {

@@ -68,15 +68,15 @@ Result<FrameInput> open_sim_input(const AppConfig& config, double automatic_rate
   if (!rate) return rate.failure();
   auto source = open_sim_source(config, *rate);
   if (!source) return source.failure();
-  if (!config.output.truth.empty()) {
-    auto written = write_truth(**source, config.output.truth, original_stamps);
-    if (!written) return written.failure();
-  }
-  const sim::SimSource* world = source->get();
+  sim::SimSource* world = source->get();
   FrameInput input;
   input.cameras = to_cameras(world->calibration());
   input.original_stamp = [world](std::int64_t fed) { return world->original_stamp(fed); };
   input.rate = *rate;
+  input.begin = [world, truth = config.output.truth, original_stamps]() -> Result<void> {
+    world->begin();
+    return truth.empty() ? Result<void>() : write_truth(*world, truth, original_stamps);
+  };
   input.source = std::move(*source);
   return input;
 }

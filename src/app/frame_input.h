@@ -20,6 +20,8 @@ struct FrameInput {
   StereoCameras cameras;
   StampMap original_stamp;  ///< Uses `source`.
   double rate = 0.0;        ///< Speed against the recording; 0: as fast as can be.
+  /// Starts the source's clock; to be called right before the first frame is asked for.
+  std::function<Result<void>()> begin = [] { return Result<void>(); };
 };
 
 /// Speed as `DatasetOptions::rate` has it: "max" is 0, "auto" is `automatic`, else a positive
@@ -30,7 +32,7 @@ Result<double> parse_rate(const std::string& text, double automatic);
 /// see `parse_rate`.
 Result<FrameInput> open_dataset_input(const CameraSection& camera, double automatic_rate);
 
-/// Builds the simulated world of the configuration, and writes its true trajectory where
+/// Builds the simulated world of the configuration. Its `begin` writes the true trajectory where
 /// `output.truth` says, with the stamps that frames are given with (`original_stamps`: those of
 /// the trajectory, whatever `reverse` and `restamp` make of them).
 Result<FrameInput> open_sim_input(const AppConfig& config, double automatic_rate,

@@ -57,6 +57,7 @@ int run(AppConfig config, bool simulated) {
   // As fast as can be means that the source waits for the odometry and nothing is dropped.
   if (input->rate == 0.0) config.odometry.wait_for_mapping = true;
   OdometrySession session(config, input->cameras);
+  if (auto begun = input->begin(); !begun) return fail(kFailed, begun.error());
   const bool source_ok = feed(*input->source, session, stop);
   const int code = session.finish(input->original_stamp);
   return source_ok ? code : kBadInput;

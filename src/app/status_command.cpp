@@ -1,3 +1,4 @@
+#include <spdlog/fmt/fmt.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -10,49 +11,27 @@
 #include "sovo/app/config_options.h"
 #include "sovo/app/failure.h"
 #include "sovo/app/message_json.h"
+#include "sovo/app/status_view.h"
 #include "sovo/app/stop_signal.h"
 #include "sovo/bridge/reader.h"
 #include "sovo/bridge/topics.h"
-#include "sovo/odometry/odometry_output.h"
 
 namespace sovo::app {
 namespace {
 
+using bridge::msg::ScaledOdometry;
+using bridge::msg::StereoCalibration;
 using bridge::msg::VoStatus;
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::seconds kPatience(5);
 
 struct StatusOptions {
   bool once = false;
   bool json = false;
+  bool line = false;
+  std::string truth;
 };
-
-std::string text_or_dash(const char* text) { return text == nullptr || *text == '\0' ? "-" : text; }
-
-std::string stage_lines(const VoStatus& s) {
-  std::string text = fmt::format("{:<22}{:>9}{:>9}{:>9}\n", "stage [ms]", "last", "mean", "max");
-  for (std::uint32_t i = 0; i < s.stages._length; ++i) {
-    const auto& stage = s.stages._buffer[i];
-    text += fmt::format("{:<22}{:>9.2f}{:>9.2f}{:>9.2f}\n", text_or_dash(stage.name), stage.last_ms,
-                        stage.mean_ms, stage.max_ms);
-  }
-  return text;
-}
-
-std::string screen(const VoStatus& s) {
-  const auto state = to_string(static_cast<OdometryState>(s.state));
-  std::string text = fmt::format("state       {} ({})\n", state, text_or_dash(s.reason));
-  text += fmt::format("frame       {} of session {:x}; latency {:.1f} ms, queue {}\n", s.sequence,
-                      s.session, 1e3 * s.latency_s, s.queue_depth);
-  text += fmt::format("received    {}; lost in transport {}, dropped {}, refused {}\n", s.received,
-                      s.lost_transport, s.dropped_queue, s.rejected);
-  text += fmt::format("map         segment {}, {} keyframes, {} points, {} inliers\n", s.segment,
-                      s.keyframes, s.points, s.inliers);
-  text += fmt::format("tracking    residual {:.2f} grey levels, pair error {:.3f} ms\n", s.residual,
-                      1e3 * s.sync_error_s);
-  text += fmt::format("distance    {:.2f} m, {} resets\n", s.distance_m, s.reset_counter);
-  text +=
-      fmt::format("command     {} {}\n\n", s.last_command_id, text_or_dash(s.last_command_result));
-  return text + stage_lines(s);
-}
 
 void show(const VoStatus& status, const StatusOptions& options) {
   if (options.json) {
@@ -60,9 +39,16 @@ void show(const VoStatus& status, const StatusOptions& options) {
     return;
   }
   const bool redraw = !options.once && isatty(STDOUT_FILENO) == 1;
-  std::cout << (redraw ? "\x1b[H\x1b[J" : "") << screen(status) << std::endl;
+  std::cout << (redraw ? "\x1b[H\x1b[J" : "") << status_screen(status) << std::endl;
 }
 
+std::string silence_on(const std::string& topic) {
+  return fmt::format(
+      "nothing on {} for {} s; is sovo vo running, in the same domain and namespace?", topic,
+      kPatience.count());
+}
+
+/// Every status, or five a second for people.
 int watch(const AppConfig& config, const StatusOptions& options) {
   StopSignal stop;
   auto participant = bridge::Participant::open(config.dds, "status");
@@ -71,8 +57,6 @@ int watch(const AppConfig& config, const StatusOptions& options) {
                                                bridge::topics::kStatusQos);
   if (!reader) return fail(kFailed, reader.error());
 
-  using Clock = std::chrono::steady_clock;
-  constexpr std::chrono::seconds kPatience(5);
   auto last = Clock::now();
   auto last_shown = last - kPatience;
   while (!stop.requested()) {
@@ -89,13 +73,87 @@ int watch(const AppConfig& config, const StatusOptions& options) {
     if (!taken) return fail(kFailed, taken.error());
     if (done) return kOk;
     if (Clock::now() - last < kPatience) continue;
-    const std::string silence = fmt::format(
-        "nothing on {} for {} s; is sovo vo running, in the "
-        "same domain and namespace?",
-        reader->topic(), kPatience.count());
-    if (options.once) return fail(kFailed, silence);
-    spdlog::warn("{}", silence);
+    if (options.once) return fail(kFailed, silence_on(reader->topic()));
+    spdlog::warn("{}", silence_on(reader->topic()));
     last = Clock::now();
+  }
+  return kOk;
+}
+
+/// The topics that a status line is made of.
+class LineFeed {
+ public:
+  static Result<LineFeed> open(const bridge::Participant& participant) {
+    auto status = bridge::Reader<VoStatus>::open(participant, bridge::topics::kStatus,
+                                                 bridge::topics::kStatusQos);
+    if (!status) return status.failure();
+    auto odometry = bridge::Reader<ScaledOdometry>::open(
+        participant, bridge::topics::kScaledOdometry, bridge::topics::kScaledOdometryQos);
+    if (!odometry) return odometry.failure();
+    auto calibration = bridge::Reader<StereoCalibration>::open(
+        participant, bridge::topics::kCalibration, bridge::topics::kCalibrationQos);
+    if (!calibration) return calibration.failure();
+    return LineFeed(std::move(*status), std::move(*odometry), std::move(*calibration));
+  }
+
+  /// Gives the line what has come within 200 ms.
+  Result<void> update(StatusLine* line) {
+    status_.wait(std::chrono::milliseconds(200));
+    const auto calibrations =
+        calibration_.take_each([line](const StereoCalibration& m, const auto&) { line->add(m); });
+    if (!calibrations) return calibrations.failure();
+    const auto poses =
+        odometry_.take_each([line](const ScaledOdometry& m, const auto&) { line->add(m); });
+    if (!poses) return poses.failure();
+    const auto states =
+        status_.take_each([line](const VoStatus& m, const auto&) { line->add(m, Clock::now()); });
+    if (!states) return states.failure();
+    if (*states > 0) last_ = Clock::now();
+    return {};
+  }
+
+  Clock::duration silence() const { return Clock::now() - last_; }
+  const std::string& topic() const { return status_.topic(); }
+
+ private:
+  LineFeed(bridge::Reader<VoStatus> status, bridge::Reader<ScaledOdometry> odometry,
+           bridge::Reader<StereoCalibration> calibration)
+      : status_(std::move(status)),
+        odometry_(std::move(odometry)),
+        calibration_(std::move(calibration)) {}
+
+  bridge::Reader<VoStatus> status_;
+  bridge::Reader<ScaledOdometry> odometry_;
+  bridge::Reader<StereoCalibration> calibration_;
+  Clock::time_point last_ = Clock::now();
+};
+
+/// A line a second while frames come.
+int watch_line(const AppConfig& config, const StatusOptions& options) {
+  Trajectory truth;
+  if (!options.truth.empty()) {
+    auto read = read_trajectory(options.truth, "");
+    if (!read) return fail(kBadInput, read.error());
+    truth = std::move(*read);
+  }
+  StopSignal stop;
+  auto participant = bridge::Participant::open(config.dds, "status");
+  if (!participant) return fail(kFailed, participant.error());
+  auto feed = LineFeed::open(*participant);
+  if (!feed) return fail(kFailed, feed.error());
+  StatusLine line(std::move(truth));
+  auto last_shown = Clock::now();
+  while (!stop.requested()) {
+    if (auto done = feed->update(&line); !done) return fail(kFailed, done.error());
+    if (options.once && feed->silence() > kPatience) {
+      return fail(kFailed, silence_on(feed->topic()));
+    }
+    const auto text = line.text();
+    const bool fresh = feed->silence() < std::chrono::seconds(1);
+    if (!text || !fresh || Clock::now() - last_shown < std::chrono::seconds(1)) continue;
+    std::cout << *text << std::endl;
+    if (options.once) return kOk;
+    last_shown = Clock::now();
   }
   return kOk;
 }
@@ -107,11 +165,18 @@ void add_status_command(const Command& program) {
   auto status = std::make_shared<StatusOptions>();
   command.flag("--once", "Show the next state and end", &status->once);
   command.flag("--json", "One line of JSON a state", &status->json);
+  command.flag("--line", "One line of text a second, with the scale and its sigma", &status->line);
+  command
+      .option("--truth", "With --line: drift against this trajectory of the left camera",
+              &status->truth)
+      .type("FILE");
   auto options = std::make_shared<ConfigOptions>(command);
   add_dds_options(*options);
   command.action([options, status] {
     const auto config = options->load();
-    return config ? watch(*config, *status) : fail(kUsage, config.error());
+    if (!config) return fail(kUsage, config.error());
+    if (!status->truth.empty() && !status->line) return fail(kUsage, "--truth goes with --line");
+    return status->line ? watch_line(*config, *status) : watch(*config, *status);
   });
 }
 

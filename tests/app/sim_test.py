@@ -92,7 +92,7 @@ class SimulatedRefusals(SimTest):
         self.refused(BAD_INPUT, ["/nowhere.txt", "town", "expressway"], "run", "--world", "street",
                      "--trajectory", "/nowhere.txt")
         self.refused(BAD_INPUT, ["no pair 100000"], "run", "--world", "hall", "--start", 100000)
-        self.refused(BAD_INPUT, ["cannot be written"], "run", *self.world("lawn"),
+        self.refused(USAGE, ["/nowhere does not exist"], "run", *self.world("lawn"),
                      "--truth", "/nowhere/truth.txt")
 
 
@@ -132,6 +132,19 @@ class SimulatedBus(SimTest, BusTest):
         self.assertEqual(len(poses), FRAMES, log)
         self.assertLess(abs(float(poses[0][0]) - time.time()), 600)
         self.assertLess(largest_error(poses, true_poses, poses[0][0]), 0.05)
+
+    def test_a_line_of_state_with_scale_and_drift(self):
+        truth = self.folder / "truth.txt"
+        self.start("vo")
+        self.start("camera", "sim", *self.world("lawn"), "--rate", 4, "--restamp",
+                   "--truth", truth)
+        deadline = time.time() + 120
+        while not truth.exists() and time.time() < deadline:
+            time.sleep(0.1)
+        status = self.expect(sovo("status", "--line", "--once", "--truth", truth, *self.bus), OK)
+        self.assertRegex(status.stdout, rf"^frame \d+ of {FRAMES}, .* Hz, latency \d+ ms, \w+, ")
+        for word in ("points", "scale", "+-", "drift 0.0"):
+            self.assertIn(word, status.stdout)
 
 
 if __name__ == "__main__":

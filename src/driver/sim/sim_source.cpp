@@ -91,7 +91,6 @@ SimSource::SimSource(const SimConfig& config, Calibration calibration, Motion mo
       right_exposure_(config.sensor, scene_.exposure_s) {
   calibration_.left_photometric = left_sensor_.photometric();
   calibration_.right_photometric = right_sensor_.photometric();
-  if (config.restamp) shift_ns_ = utc_now_ns() - stamp_of(delivered_.front());
   decoder_ = std::make_unique<FrameDecoder>(delivered_.size(),
                                             [this](std::size_t n) { return render(n); });
 }
@@ -169,7 +168,7 @@ SourceResult SimSource::render(std::size_t n) {
   SourceResult result;
   result.state = SourceState::kFrame;
   StereoFrame& frame = result.frame;
-  frame.stamp_ns = stamp + shift_ns_;
+  frame.stamp_ns = stamp;
   frame.sequence = index;
   frame.clock = kHostClock;
   frame.pair_error_s = std::abs(offset_s);
@@ -203,12 +202,20 @@ SourceResult SimSource::render(std::size_t n) {
   return result;
 }
 
+void SimSource::begin() {
+  if (std::exchange(begun_, true)) return;
+  start_ = std::chrono::steady_clock::now();
+  if (config_.restamp) shift_ns_ = utc_now_ns() - stamp_of(delivered_.front());
+}
+
 SourceResult SimSource::next(std::chrono::milliseconds timeout) {
+  begin();
   constexpr std::chrono::milliseconds kLongest = std::chrono::hours(24);
   const auto deadline = std::chrono::steady_clock::now() + std::min(timeout, kLongest);
   if (!waiting_) {
     SourceResult result = decoder_->next(deadline);
     if (result.state != SourceState::kFrame) return result;
+    result.frame.stamp_ns += shift_ns_;
     waiting_ = std::move(result);
   }
   if (config_.rate > 0.0) {
@@ -216,7 +223,6 @@ SourceResult SimSource::next(std::chrono::milliseconds timeout) {
         waiting_->frame.stamp_ns - shift_ns_ - stamp_of(delivered_.front());
     const std::chrono::nanoseconds since(
         std::llround(static_cast<double>(since_first) / config_.rate));
-    if (!std::exchange(begun_, true)) start_ = std::chrono::steady_clock::now() - since;
     const auto due = start_ + since;
     std::this_thread::sleep_until(std::min(due, deadline));
     if (deadline < due) return {};

@@ -23,11 +23,15 @@ class SimSource : public FrameSource {
   /// Pairs that are not dropped.
   std::optional<std::size_t> size() const override { return delivered_.size(); }
 
+  /// Starts the clock: `restamp` and `rate` count from here. `next` does it when nobody did.
+  void begin();
+
   const Calibration& calibration() const { return calibration_; }
   const Motion& motion() const { return motion_; }
   double frame_rate() const { return frame_rate_; }
 
-  /// The true pose of the left camera at the stamp of every pair that is not dropped.
+  /// The true pose of the left camera at the stamp of every pair that is not dropped; with
+  /// `restamp`, after `begin`.
   Trajectory truth() const;
   /// The true pose of the left camera at a stamp.
   SE3 pose_at(std::int64_t stamp_ns) const;
@@ -66,7 +70,7 @@ class SimSource : public FrameSource {
   ExposureControl right_exposure_;
   bool settled_ = false;
   bool begun_ = false;
-  std::chrono::steady_clock::time_point start_;  ///< When the first pair was due.
+  std::chrono::steady_clock::time_point start_;  ///< When the first pair is due.
   std::optional<SourceResult> waiting_;
   std::unique_ptr<FrameDecoder> decoder_;  ///< Last: its thread uses the members above.
 };

@@ -14,7 +14,7 @@ void add_config_command(CLI::App& app, int* exit_code) {
       "Print the configuration as YAML with comments: the defaults, or what --config, "
       "--set and the options make of them");
   auto options = std::make_shared<ConfigOptions>(command);
-  options->value("--preset", "preset", "Values to begin with", "default|fast");
+  options->value("--preset", "preset", "Values to begin with", "embedded|default|quality");
   command->callback([options, exit_code] {
     const auto config = options->load();
     if (!config) {

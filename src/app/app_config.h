@@ -12,8 +12,9 @@ namespace sovo::app {
 
 /// Sets of values for a purpose; what the user names still wins.
 enum class Preset {
-  kDefault,  ///< Accuracy: 2000 points, 7 keyframes.
-  kFast,     ///< Small computers: 800 points, 6 keyframes.
+  kEmbedded,  ///< Small computers: 800 points, 6 keyframes.
+  kDefault,   ///< 2000 points, 7 keyframes.
+  kQuality,   ///< The same with more iterations of bundle adjustment.
 };
 
 /// Which implementation of the inner loops runs.
@@ -22,8 +23,10 @@ enum class Kernels {
   kScalar,  ///< Plain C++.
 };
 
-constexpr std::array<std::pair<Preset, const char*>, 2> enum_names(Preset) {
-  return {{{Preset::kDefault, "default"}, {Preset::kFast, "fast"}}};
+constexpr std::array<std::pair<Preset, const char*>, 3> enum_names(Preset) {
+  return {{{Preset::kEmbedded, "embedded"},
+           {Preset::kDefault, "default"},
+           {Preset::kQuality, "quality"}}};
 }
 constexpr std::array<std::pair<Kernels, const char*>, 2> enum_names(Kernels) {
   return {{{Kernels::kAuto, "auto"}, {Kernels::kScalar, "scalar"}}};
@@ -99,7 +102,7 @@ struct AppConfig {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v("preset", preset, "values to begin with, before this file's: default, fast");
+    v("preset", preset, "values to begin with, before this file's");
     v("kernels", kernels, "implementation of the inner loops");
     odometry.visit(v);
     v("camera", camera, "source of frames");

@@ -174,7 +174,7 @@ void add_bench_command(const Command& program) {
       .value("--calib", "camera.calibration", "Cameras to render with, not the world's", "FILE")
       .value("--frames", "camera.frames", "Frames at most", "N")
       .value("--mode", "mode", "Who owns the metric scale", "mono|scale")
-      .value("--preset", "preset", "Values to begin with", "default|fast")
+      .value("--preset", "preset", "Values to begin with", "embedded|default|quality")
       .value("--threads", "threads", "Of the loops inside the stages", "N");
   command.action([options, arguments] {
     const auto config = options->load();

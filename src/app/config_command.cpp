@@ -14,7 +14,7 @@ void add_config_command(const Command& program) {
       "Print the configuration as YAML with comments: the defaults, or what --config, "
       "--set and the options make of them");
   auto options = std::make_shared<ConfigOptions>(command);
-  options->value("--preset", "preset", "Values to begin with", "default|fast");
+  options->value("--preset", "preset", "Values to begin with", "embedded|default|quality");
   command.action([options]() -> int {
     const auto config = options->load();
     if (!config) return fail(kUsage, config.error());

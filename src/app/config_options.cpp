@@ -10,6 +10,7 @@ namespace {
 
 std::vector<std::string> preset_assignments(Preset preset) {
   if (preset == Preset::kDefault) return {};
+  if (preset == Preset::kQuality) return {"vo.window.max_iterations=10"};
   return {"vo.points.active_points=800", "vo.points.immature_points=600",
           "vo.keyframe.max_keyframes=6", "vo.keyframe.min_keyframes=4",
           "vo.window.max_iterations=4"};
@@ -108,7 +109,7 @@ void add_sim_options(ConfigOptions& options) {
 
 void add_odometry_options(ConfigOptions& options) {
   options.value("--mode", "mode", "Who owns the metric scale", "mono|scale")
-      .value("--preset", "preset", "Values to begin with", "default|fast")
+      .value("--preset", "preset", "Values to begin with", "embedded|default|quality")
       .value("--init", "init", "How the map begins", "auto|stereo|two_view")
       .value("--depth-init", "depth_init", "A new point's first depth interval", "temporal|stereo")
       .value("--threads", "threads", "Of the loops inside the stages", "N")

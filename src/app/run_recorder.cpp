@@ -24,9 +24,7 @@ void RunRecorder::on_frame(const OdometryOutput& output) {
 
 void RunRecorder::on_keyframe(const KeyframeOutput& keyframe) {
   const std::lock_guard lock(mutex_);
-  if (counts_.keyframes > 0 && keyframe.id <= newest_keyframe_) return;  // revised
-  newest_keyframe_ = keyframe.id;
-  ++counts_.keyframes;
+  counts_.keyframes += keyframe.revised ? 0 : 1;
 }
 
 void RunRecorder::on_scale(const ScaleRecord& record) {
@@ -38,7 +36,6 @@ void RunRecorder::on_scale(const ScaleRecord& record) {
 void RunRecorder::clear() {
   const std::lock_guard lock(mutex_);
   counts_ = {};
-  newest_keyframe_ = 0;
   last_reason_.clear();
   live_.clear();
   scales_.clear();

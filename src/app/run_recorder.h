@@ -52,7 +52,6 @@ class RunRecorder : public OutputSink {
   const Keep keep_;
   mutable std::mutex mutex_;
   RunCounts counts_;
-  std::uint32_t newest_keyframe_ = 0;
   std::uint32_t first_segment_ = 0;
   std::string last_reason_;
   std::vector<TrajectoryPose> live_;

@@ -1,5 +1,7 @@
 #include "sovo/bridge/odometry_conversion.h"
 
+#include <limits>
+
 #include "sovo/bridge/borrow.h"
 #include "sovo/bridge/ros_conversion.h"
 
@@ -94,7 +96,8 @@ msg::Keyframe to_message(const KeyframeOutput& keyframe, const SE3& T_base_left,
   m.id = keyframe.id;
   m.segment = keyframe.segment;
   m.pose = to_pose(T_base_left * keyframe.T_odom_left);
-  m.log_scale = keyframe.log_scale;
+  m.log_scale =
+      keyframe.scale_valid ? keyframe.log_scale : std::numeric_limits<double>::quiet_NaN();
   borrow(m.u, keyframe.u);
   borrow(m.v, keyframe.v);
   borrow(m.inverse_depth, keyframe.inverse_depth);

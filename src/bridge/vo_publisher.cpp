@@ -94,7 +94,6 @@ void VoPublisher::check(const Result<void>& written) {
 }
 
 void VoPublisher::on_frame(const OdometryOutput& output) {
-  metric_ = output.scale_valid && config_.publish_odom;
   if (output.pose_valid) publish_pose(output);
   FeedStatus feed;
   {
@@ -109,7 +108,7 @@ void VoPublisher::on_frame(const OdometryOutput& output) {
 void VoPublisher::publish_pose(const OdometryOutput& output) {
   const BaseMotion motion = to_base(output, T_base_left_);
   check(writers_->scaled->write(to_scaled_odometry(output, motion, frames_)));
-  if (!metric_) return;
+  if (!output.scale_valid || !config_.publish_odom) return;
   check(writers_->odom->write(to_odometry(output, motion, frames_)));
   if (writers_->tf) publish_transform(output, motion);
 }
@@ -131,12 +130,11 @@ void VoPublisher::publish_diagnostics(const OdometryOutput& output, const FeedSt
 
 void VoPublisher::on_keyframe(const KeyframeOutput& keyframe) {
   check(writers_->keyframe->write(to_message(keyframe, T_base_left_, frames_)));
-  if (metric_) publish_path(keyframe);
+  if (keyframe.id == 0 && !keyframe.revised) path_.clear();  // another map begins
+  if (keyframe.scale_valid && config_.publish_odom) publish_path(keyframe);
 }
 
 void VoPublisher::publish_path(const KeyframeOutput& keyframe) {
-  if (keyframe.segment != path_segment_) path_.clear();
-  path_segment_ = keyframe.segment;
   path_.insert_or_assign(keyframe.id, to_path_pose(keyframe, T_base_left_, frames_));
   if (path_.size() > kLongestPath) path_.erase(path_.begin());
   if (!due(&last_path_)) return;

@@ -34,7 +34,8 @@ struct VoPublisherConfig {
 ///     odometry.process(frame);
 ///
 /// Nothing goes to `odom`, `/tf` and `path` before the scale is valid, and only `status` speaks of
-/// a frame without a pose.
+/// a frame without a pose. A keyframe is written whenever the odometry gives it out, and replaces
+/// what was written with its id; `path` shows each as it was written last.
 class VoPublisher : public OutputSink {
  public:
   ~VoPublisher() override;
@@ -79,10 +80,8 @@ class VoPublisher : public OutputSink {
   FeedStatus feed_;
   std::string failure_;
 
-  std::atomic<bool> metric_{false};
   std::atomic<std::uint64_t> failed_writes_{0};
   std::map<std::uint32_t, msg::PoseStamped> path_;  // by keyframe; only on_keyframe uses it
-  std::uint32_t path_segment_ = 0;
   std::chrono::steady_clock::time_point last_path_;
   std::chrono::steady_clock::time_point last_diagnostics_;
 };

@@ -4,11 +4,15 @@
 #include <chrono>
 #include <cmath>
 
+#include "sovo/odometry/trajectory_recorder.h"
+
 namespace sovo {
 
 namespace {
 
 constexpr int kMatchBlock = 64;
+/// So many keyframes wait for a scale, the newest ones: a map may go without one for days.
+constexpr std::size_t kMostWaiting = 200;
 
 Stage stage_of(MapStage stage) {
   switch (stage) {
@@ -28,6 +32,17 @@ Stage stage_of(MapStage stage) {
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+std::vector<std::uint8_t> intensities(const ImageF& image, const KeyframePoints& points) {
+  std::vector<std::uint8_t> out;
+  out.reserve(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const int x = std::clamp(static_cast<int>(points.u[i] + 0.5F), 0, image.width() - 1);
+    const int y = std::clamp(static_cast<int>(points.v[i] + 0.5F), 0, image.height() - 1);
+    out.push_back(static_cast<std::uint8_t>(std::clamp(image.at(x, y), 0.0F, 255.0F)));
+  }
+  return out;
 }
 
 DepthProposal proposal_of(const StaticMatch& match) {
@@ -97,6 +112,11 @@ bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage&
   publish_scale(nullptr, true);
   initialized_ = true;
   reason_.clear();
+  MappingOutcome start;
+  start.map.active_points = vo_.window().num_active_points();
+  start.map.keyframes = 1;
+  start.keyframes = {first_keyframe()};
+  start_outcome_ = std::move(start);
   return true;
 }
 
@@ -146,7 +166,9 @@ bool MapSegment::finish_two_views(const MonoFrame& frame, const SideImage* right
     return false;
   }
   second.wants_keyframe = true;
+  KeyframeOutput first = first_keyframe();
   start_outcome_ = map(second, right);
+  start_outcome_->keyframes.insert(start_outcome_->keyframes.begin(), std::move(first));
   initialized_ = !start_outcome_->map.failed;
   if (initialized_) reason_.clear();
   return initialized_;
@@ -202,12 +224,14 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
     }
   }
   out.map = vo_.map(tracked, proposer, timer);
+  broken_ = out.map.failed;
   if (!out.map.is_keyframe || out.map.failed) return out;
   if (observer_ != nullptr) {
     observer_->on_window(static_cast<std::uint32_t>(out.map.bundle.points),
                          static_cast<std::uint32_t>(out.map.bundle.residuals));
   }
-  out.keyframe = keyframe_output();
+  out.keyframes = {new_keyframe()};
+  revise_left(std::exchange(out.map.left, {}), &out.keyframes);
   if (use_right && config_.mode == OdometryMode::kScale && vo_.snapshot()) {
     job.snapshot = *vo_.snapshot();
     job.cold_start = filter_.wants_cold_start();
@@ -255,6 +279,7 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
     correction.log_scale = pending + update.log_scale_correction;
     correction.first_lock = !was_locked;
     record.correction = vo_.apply(correction);
+    if (correction.first_lock) refined_until_ = 0;  // it rescales what was built before
   }
   publish_scale(&record, update.apply);
   return record;
@@ -280,26 +305,82 @@ ScaleStatus MapSegment::scale_status() const {
   return status_;
 }
 
-KeyframeOutput MapSegment::keyframe_output() const {
-  const Window& window = vo_.window();
+KeyframeOutput MapSegment::first_keyframe() const {
+  KeyframeOutput out = own_points(vo_.window_keyframes().front());
+  out.scale_valid = metric();
+  out.T_odom_left = vo_.window().newest().T_world_camera();
+  return out;
+}
+
+KeyframeOutput MapSegment::new_keyframe() const {
   const KeyframeSnapshot& s = *vo_.snapshot();
   KeyframeOutput out;
   out.id = s.id;
   out.segment = index_;
   out.stamp_ns = s.stamp_ns;
-  out.T_odom_left = window.newest().T_world_camera();
+  out.scale_valid = metric();
+  out.T_odom_left = vo_.window().newest().T_world_camera();
   out.log_scale = vo_.log_scale();
   out.u = s.points.u;
   out.v = s.points.v;
   out.inverse_depth = s.points.inverse_depth;
   out.sigma = s.points.sigma;
-  const ImageF& image = s.pyramid->level(0);
-  out.intensity.reserve(out.u.size());
-  for (std::size_t i = 0; i < out.u.size(); ++i) {
-    const int x = std::clamp(static_cast<int>(out.u[i] + 0.5F), 0, image.width() - 1);
-    const int y = std::clamp(static_cast<int>(out.v[i] + 0.5F), 0, image.height() - 1);
-    out.intensity.push_back(static_cast<std::uint8_t>(std::clamp(image.at(x, y), 0.0F, 255.0F)));
+  out.intensity = intensities(s.pyramid->level(0), s.points);
+  return out;
+}
+
+/// The keyframe with its own points, in the unit that the map began with.
+KeyframeOutput MapSegment::own_points(const KeyframeState& state) const {
+  KeyframeOutput out;
+  out.id = state.id;
+  out.segment = index_;
+  out.stamp_ns = state.stamp_ns;
+  out.u = state.points.u;
+  out.v = state.points.v;
+  out.inverse_depth = state.points.inverse_depth;
+  out.sigma = state.points.sigma;
+  out.intensity = intensities(state.pyramid->level(0), state.points);
+  return out;
+}
+
+/// Gives `keyframe`, as `own_points` made it, its refined pose, and its depths the scale of that:
+/// similarities later than the keyframe's own are undone in both.
+void MapSegment::revise(const SE3& T_odom_left, KeyframeOutput* keyframe) const {
+  keyframe->revised = true;
+  keyframe->scale_valid = metric();
+  keyframe->T_odom_left = T_odom_left;
+  keyframe->log_scale = vo_.keyframes()[keyframe->id].log_scale;
+  const auto scale = static_cast<float>(std::exp(-keyframe->log_scale));
+  for (float& rho : keyframe->inverse_depth) rho *= scale;
+  for (float& sigma : keyframe->sigma) sigma *= scale;
+}
+
+void MapSegment::revise_left(std::vector<KeyframeState> left, std::vector<KeyframeOutput>* out) {
+  for (const KeyframeState& state : left) waiting_.push_back(own_points(state));
+  if (config_.mode == OdometryMode::kScale && !metric()) {
+    if (waiting_.size() > kMostWaiting) {
+      waiting_.erase(waiting_.begin(), waiting_.end() - static_cast<std::ptrdiff_t>(kMostWaiting));
+    }
+    return;
   }
+  if (waiting_.empty()) return;
+  refine_keyframe_poses(vo_.keyframes(), refined_until_, &refined_);
+  refined_until_ = vo_.window()[0].id;
+  for (KeyframeOutput& keyframe : waiting_) {
+    revise(refined_[keyframe.id], &keyframe);
+    out->push_back(std::move(keyframe));
+  }
+  waiting_.clear();
+}
+
+std::vector<KeyframeOutput> MapSegment::remaining_keyframes() const {
+  if (!initialized_) return {};
+  std::vector<KeyframeOutput> out = waiting_;
+  if (!broken_) {
+    for (const KeyframeState& state : vo_.window_keyframes()) out.push_back(own_points(state));
+  }
+  const std::vector<SE3> refined = refined_keyframe_poses(vo_.keyframes());
+  for (KeyframeOutput& keyframe : out) revise(refined[keyframe.id], &keyframe);
   return out;
 }
 

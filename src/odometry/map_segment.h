@@ -35,7 +35,7 @@ struct ScaleJob {
 /// What mapping a frame brought.
 struct MappingOutcome {
   MapResult map;
-  std::optional<KeyframeOutput> keyframe;
+  std::vector<KeyframeOutput> keyframes;  ///< To be given out, in this order: new, then revised.
   std::optional<ScaleJob> scale_job;
 };
 
@@ -69,9 +69,14 @@ class MapSegment {
   /// Filters the estimate and applies the correction to the window.
   ScaleRecord finish_scale(const ScaleJob& job, const ScaleEstimate& estimate);
 
+  /// Keyframes that are not yet given out as final, as they are now: those of the window,
+  /// and those that wait for a scale. While neither `map` nor `finish_scale` runs.
+  std::vector<KeyframeOutput> remaining_keyframes() const;
+
   ScaleStatus scale_status() const;
   const DirectOdometry& vo() const { return vo_; }
-  /// The two-view start maps its second frame itself; that job waits here once.
+  /// What the beginning has mapped by itself: the first keyframe, of two views also the second.
+  /// It waits here once.
   std::optional<MappingOutcome> take_start_outcome();
 
  private:
@@ -81,7 +86,12 @@ class MapSegment {
   std::vector<StaticMatch> match_all(const ImagePyramid& left, const ImagePyramid& right,
                                      const std::vector<SelectedPixel>& pixels) const;
   DepthProposer stereo_proposer(const ImagePyramidPtr& left, const ImagePyramid& right) const;
-  KeyframeOutput keyframe_output() const;
+  bool metric() const { return filter_.locked() && config_.mode == OdometryMode::kScale; }
+  KeyframeOutput first_keyframe() const;
+  KeyframeOutput new_keyframe() const;
+  KeyframeOutput own_points(const KeyframeState& state) const;
+  void revise(const SE3& T_odom_left, KeyframeOutput* keyframe) const;
+  void revise_left(std::vector<KeyframeState> left, std::vector<KeyframeOutput>* out);
   void publish_scale(const ScaleRecord* record, bool accepted);
 
   const StereoOdometryConfig& config_;
@@ -97,12 +107,17 @@ class MapSegment {
   ScaleFilter filter_;
 
   bool initialized_ = false;
+  bool broken_ = false;
   bool two_view_ = false;
   std::string reason_;
   std::unique_ptr<TwoViewInitializer> two_view_initializer_;
   std::unique_ptr<PixelSelector> two_view_selector_;
   std::optional<MonoFrame> two_view_first_;
   std::optional<MappingOutcome> start_outcome_;
+
+  std::vector<KeyframeOutput> waiting_;  ///< Have left the window, and wait for a scale.
+  std::vector<SE3> refined_;             ///< Refined poses of all keyframes.
+  std::size_t refined_until_ = 0;        ///< Those before this one do not change any more.
 
   std::optional<Vec3> last_keyframe_position_;
   mutable std::mutex status_mutex_;

@@ -81,15 +81,29 @@ struct OdometryOutput {
   double distance_m = 0.0;
 };
 
-/// A keyframe as bundle adjustment left it; the same id comes again when it is revised.
+/// A keyframe, given out twice or more. What comes later replaces what came before, as a whole.
+///
+/// First when bundle adjustment has taken it in: its pose is in line with the published frames, and
+/// its points are those of older keyframes where it sees them (the first keyframe of a segment
+/// shows its own). Then revised, at the latest when it leaves the window, or when its segment or
+/// the run ends: its pose is that of the refined trajectory, and its points are its own, those that
+/// were marginalized and those that are still active, in the same scale as the pose. So the revised
+/// keyframes of a segment hold each point once; they depart from the published frames by the
+/// corrections of scale that have been undone in them.
+///
+/// While the scale is sought, keyframes that have left the window wait for it, and are revised when
+/// it is found or the segment ends. A map that broke down does not revise what its window holds.
 struct KeyframeOutput {
-  std::uint32_t id = 0;
+  std::uint32_t id = 0;  ///< From 0 in each segment; those that are not revised ascend.
   std::uint32_t segment = 0;
   std::int64_t stamp_ns = 0;
+  bool revised = false;      ///< It was given out before.
+  bool scale_valid = false;  ///< Lengths are metric.
   SE3 T_odom_left;
-  double log_scale = 0.0;
-  std::vector<float> u, v, inverse_depth, sigma;  ///< Its own points [px, 1/m].
-  std::vector<std::uint8_t> intensity;
+  double log_scale = 0.0;                   ///< Sum of corrections that pose and depths have seen.
+  std::vector<float> u, v;                  ///< Its points, in its undistorted image [px].
+  std::vector<float> inverse_depth, sigma;  ///< 1 / z in its camera frame [1/m].
+  std::vector<std::uint8_t> intensity;      ///< Grey levels of the image there.
 };
 
 /// One run of the scale optimizer, a line of `--keyframes`.

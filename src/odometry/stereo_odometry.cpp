@@ -34,7 +34,7 @@ class StereoOdometry::Impl {
     if (!config_.deterministic) {
       threads_ = std::make_unique<LiveThreads>(
           static_cast<std::size_t>(std::max(1, config_.mapping_queue)),
-          LiveThreads::Callbacks{[this](const MappingOutcome& o) { publish_keyframe(o); },
+          LiveThreads::Callbacks{[this](const MappingOutcome& o) { publish_keyframes(o); },
                                  [this](const ScaleRecord& r) { sink_->on_scale(r); }});
     }
     begin_segment(SE3());
@@ -68,11 +68,11 @@ class StereoOdometry::Impl {
 
   void finish() {
     if (threads_) threads_->drain();
+    for (const KeyframeOutput& k : segment_->remaining_keyframes()) sink_->on_keyframe(k);
   }
 
   void reset() {
-    finish();
-    recorder_.close_segment(segment_->vo().keyframes());
+    end_segment();
     ++reset_counter_;
     begin_segment(last_pose_);
   }
@@ -92,6 +92,11 @@ class StereoOdometry::Impl {
     return preparation_.check_side(frame.left, true);
   }
 
+  void end_segment() {
+    finish();
+    recorder_.close_segment(segment_->vo().keyframes());
+  }
+
   void begin_segment(const SE3& T_odom_left) {
     if (threads_) threads_->set_segment(nullptr);
     segment_ = std::make_unique<MapSegment>(config_, preparation_, next_segment_++, T_odom_left,
@@ -109,7 +114,7 @@ class StereoOdometry::Impl {
       return;
     }
     if (auto start = segment_->take_start_outcome()) {
-      publish_keyframe(*start);
+      publish_keyframes(*start);
       if (start->scale_job) finish_scale(*start->scale_job);
     }
     const auto reference = segment_->vo().reference();
@@ -167,8 +172,7 @@ class StereoOdometry::Impl {
     out->reason = map_broke_down() ? "the map broke down" : "this frame does not fit the map";
     if (failures_ < config_.lost_frames && !map_broke_down()) return;
     out->reason += "; a new segment begins";
-    finish();
-    recorder_.close_segment(segment_->vo().keyframes());
+    end_segment();
     sync_failed_ = false;
     begin_segment(last_pose_);
   }
@@ -183,7 +187,7 @@ class StereoOdometry::Impl {
       return;
     }
     MappingOutcome outcome = segment_->map(tracked, right);
-    publish_keyframe(outcome);
+    publish_keyframes(outcome);
     sync_failed_ = outcome.map.failed;
     if (outcome.scale_job) finish_scale(*outcome.scale_job);
   }
@@ -192,8 +196,8 @@ class StereoOdometry::Impl {
     sink_->on_scale(segment_->finish_scale(job, segment_->estimate_scale(job)));
   }
 
-  void publish_keyframe(const MappingOutcome& outcome) {
-    if (outcome.keyframe) sink_->on_keyframe(*outcome.keyframe);
+  void publish_keyframes(const MappingOutcome& outcome) {
+    for (const KeyframeOutput& k : outcome.keyframes) sink_->on_keyframe(k);
     const std::lock_guard lock(map_mutex_);
     map_points_ = static_cast<std::uint32_t>(outcome.map.active_points);
     map_keyframes_ = static_cast<std::uint32_t>(outcome.map.keyframes);

@@ -115,8 +115,8 @@ class StereoOdometry {
   /// Takes the next frame. Every frame yields exactly one `on_frame`, also refused ones.
   void process(const StereoFrame& frame);
 
-  /// Waits until all work is done and all keyframes are given out; call before reading the
-  /// trajectory. More frames may follow.
+  /// Waits until all work is done, and gives out the keyframes of the window as they are then; call
+  /// before reading the trajectory. More frames may follow.
   void finish();
 
   /// Forgets the map and begins a new segment with the next frame.

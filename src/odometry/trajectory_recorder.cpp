@@ -4,18 +4,33 @@
 
 namespace sovo {
 
+namespace {
+
+/// Position of a keyframe without the similarities that came later than its own.
+Vec3 without_later(const KeyframePose& k) {
+  return (k.T_world_camera.translation() - k.later_shift) / k.later_scale;
+}
+
+}  // namespace
+
 std::vector<SE3> refined_keyframe_poses(const std::vector<KeyframePose>& keyframes) {
   std::vector<SE3> poses;
-  poses.reserve(keyframes.size());
-  Vec3 last_y = Vec3::Zero();
-  for (const KeyframePose& k : keyframes) {
-    const Vec3 y = (k.T_world_camera.translation() - k.later_shift) / k.later_scale;
-    const Vec3 position =
-        poses.empty() ? y : poses.back().translation() + std::exp(k.own_log_scale) * (y - last_y);
-    poses.emplace_back(k.T_world_camera.rotation(), position);
-    last_y = y;
-  }
+  refine_keyframe_poses(keyframes, 0, &poses);
   return poses;
+}
+
+void refine_keyframe_poses(const std::vector<KeyframePose>& keyframes, std::size_t first,
+                           std::vector<SE3>* poses) {
+  poses->resize(keyframes.size());
+  for (std::size_t i = first; i < keyframes.size(); ++i) {
+    const KeyframePose& k = keyframes[i];
+    Vec3 position = without_later(k);
+    if (i > 0) {
+      const Vec3 step = position - without_later(keyframes[i - 1]);
+      position = (*poses)[i - 1].translation() + std::exp(k.own_log_scale) * step;
+    }
+    (*poses)[i] = SE3(k.T_world_camera.rotation(), position);
+  }
 }
 
 void TrajectoryRecorder::add(const TrackedFrame& tracked) {

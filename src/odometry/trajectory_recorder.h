@@ -38,4 +38,8 @@ class TrajectoryRecorder {
 /// led to it: position_n = position_(n-1) + s_n (y_n - y_(n-1)), y without later similarities.
 std::vector<SE3> refined_keyframe_poses(const std::vector<KeyframePose>& keyframes);
 
+/// The same when only keyframes from `first` on have changed: `poses` keeps those before.
+void refine_keyframe_poses(const std::vector<KeyframePose>& keyframes, std::size_t first,
+                           std::vector<SE3>* poses);
+
 }  // namespace sovo

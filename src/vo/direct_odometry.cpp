@@ -58,6 +58,14 @@ std::unique_ptr<Keyframe> new_keyframe(std::uint32_t id, const MonoFrame& frame,
   return k;
 }
 
+/// Standard deviation of a point's inverse depth; 0 when that says nothing about its depth.
+double known_sigma(const Point& p) {
+  if (p.hessian <= 0.0) return 0.0;
+  // Pattern pixels are correlated: half of them count.
+  const double sigma = kPixelNoise * std::sqrt(2.0 / p.hessian);
+  return sigma > kMaxRelativeSigma * p.rho ? 0.0 : sigma;
+}
+
 /// Narrows an immature point's interval to a proposed depth.
 void set_interval(const DepthProposal& depth, double sigmas, ImmaturePoint* p) {
   if (depth.sigma <= 0.0F) return;
@@ -105,6 +113,15 @@ std::vector<SelectedPixel> DirectOdometry::select_pixels(const MonoFrame& frame,
 
 void DirectOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
                            const std::vector<StartPoint>& points) {
+  window_ = Window(camera_);
+  keyframes_.clear();
+  marginalized_.clear();
+  snapshot_.reset();
+  past_.clear();
+  has_first_rmse_ = false;
+  last_affine_ = {};
+  last_rmse_ = 0.0;
+  next_id_ = 0;
   Keyframe& k =
       window_.insert(new_keyframe(next_id_++, frame, T_world_camera, Affine(), config_.window));
   for (const StartPoint& s : points) {
@@ -195,7 +212,7 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
   erase_marked_points(&window_);
   publish_reference();
   take_snapshot();
-  marginalize(timer);
+  result.left = marginalize(timer);
   add_immature_points(proposer, timer);
   record_poses();
   result.active_points = window_.num_active_points();
@@ -203,16 +220,51 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
   return result;
 }
 
-void DirectOdometry::marginalize(const MapTimer& timer) {
+std::vector<KeyframeState> DirectOdometry::marginalize(const MapTimer& timer) {
   const StageTimer t(timer, MapStage::kMarginalization);
   record_poses();  // of those that leave now
   const LeavingPoints leaving = mark_leaving_points(config_.window, &window_);
+  for (const PointRef& ref : leaving.marginalize) {
+    keep_point(*ref.point, &marginalized_[window_[ref.host].id]);
+  }
   marginalize_points(config_.window, leaving.marginalize, &window_, pool_);
   erase_marked_points(&window_);
+  std::vector<KeyframeState> left;
+  for (int i = 0; i < window_.size(); ++i) {
+    if (window_[i].leaving) left.push_back(state_without_active_points(window_[i]));
+  }
   for (int i = window_.size() - 1; i >= 0; --i) {
     if (window_[i].leaving) marginalize_keyframe(config_.window, i, &window_);
   }
+  for (const KeyframeState& k : left) marginalized_.erase(k.id);
   window_.update_geometry();
+  return left;
+}
+
+void DirectOdometry::keep_point(const Point& point, KeyframePoints* points) const {
+  const double sigma = known_sigma(point);
+  if (sigma <= 0.0) return;
+  const double to_first_unit = std::exp(log_scale_);
+  points->u.push_back(point.u);
+  points->v.push_back(point.v);
+  points->inverse_depth.push_back(static_cast<float>(point.rho * to_first_unit));
+  points->sigma.push_back(static_cast<float>(sigma * to_first_unit));
+}
+
+KeyframeState DirectOdometry::state_without_active_points(const Keyframe& keyframe) const {
+  KeyframeState state{keyframe.id, keyframe.stamp_ns, keyframe.pyramid, {}};
+  const auto kept = marginalized_.find(keyframe.id);
+  if (kept != marginalized_.end()) state.points = kept->second;
+  return state;
+}
+
+std::vector<KeyframeState> DirectOdometry::window_keyframes() const {
+  std::vector<KeyframeState> states;
+  for (int i = 0; i < window_.size(); ++i) {
+    states.push_back(state_without_active_points(window_[i]));
+    for (const Point& p : window_[i].points) keep_point(p, &states.back().points);
+  }
+  return states;
 }
 
 void DirectOdometry::add_immature_points(const DepthProposer& proposer, const MapTimer& timer) {
@@ -281,10 +333,8 @@ void DirectOdometry::take_snapshot() {
     for (Point& p : window_[h].points) {
       const bool was_in = std::exchange(p.in_snapshot, false);
       const Residual& r = p.residuals[slot];
-      if (r.state != ResidualState::kIn || p.hessian <= 0.0 || r.centre_rho <= 0.0F) continue;
-      // Pattern pixels are correlated: half of them count.
-      const double sigma = kPixelNoise * std::sqrt(2.0 / p.hessian);
-      if (sigma > kMaxRelativeSigma * p.rho) continue;
+      const double sigma = known_sigma(p);
+      if (r.state != ResidualState::kIn || sigma <= 0.0 || r.centre_rho <= 0.0F) continue;
       const double ratio = r.centre_rho / p.rho;
       s.points.u.push_back(r.centre_u);
       s.points.v.push_back(r.centre_v);

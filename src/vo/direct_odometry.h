@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -51,6 +52,16 @@ struct TrackedFrame {
   bool wants_keyframe = false;
 };
 
+/// A keyframe with points of its own: those that were marginalized, and those still active.
+struct KeyframeState {
+  std::uint32_t id = 0;
+  std::int64_t stamp_ns = 0;
+  ImagePyramidPtr pyramid;
+  /// Where they are known to better than half their depth. Inverse depths are in the unit that the
+  /// map began with: exp(-log_scale) times them are in the unit of a `log_scale`.
+  KeyframePoints points;
+};
+
 /// What one call of `map` did.
 struct MapResult {
   bool is_keyframe = false;
@@ -58,6 +69,7 @@ struct MapResult {
   BundleResult bundle;
   int active_points = 0;
   int keyframes = 0;
+  std::vector<KeyframeState> left;  ///< Keyframes that left the window, oldest first.
 };
 
 /// Parts of the mapping that are timed.
@@ -92,7 +104,7 @@ class DirectOdometry {
   std::vector<SelectedPixel> select_pixels(const MonoFrame& frame, int wanted);
 
   /// Begins a map with `frame` as first keyframe: points with a depth become active, the others
-  /// immature.
+  /// immature. What another beginning left is forgotten.
   void begin(const MonoFrame& frame, const SE3& T_world_camera,
              const std::vector<StartPoint>& points);
 
@@ -113,6 +125,8 @@ class DirectOdometry {
   double apply(const ScaleCorrection& correction);
 
   const Window& window() const { return window_; }
+  /// The keyframes of the window with their points as they are now, oldest first.
+  std::vector<KeyframeState> window_keyframes() const;
   std::uint64_t scale_epoch() const { return scale_epoch_; }
   double log_scale() const { return log_scale_; }
 
@@ -126,7 +140,9 @@ class DirectOdometry {
   MapResult make_keyframe(const TrackedFrame& tracked, const SE3& T_world_camera,
                           const DepthProposer& proposer, const MapTimer& timer);
   void add_immature_points(const DepthProposer& proposer, const MapTimer& timer);
-  void marginalize(const MapTimer& timer);
+  std::vector<KeyframeState> marginalize(const MapTimer& timer);
+  void keep_point(const Point& point, KeyframePoints* points) const;
+  KeyframeState state_without_active_points(const Keyframe& keyframe) const;
   void publish_reference();
   void record_poses();
   void rescale_records(double scale, const Vec3& centre);
@@ -153,6 +169,7 @@ class DirectOdometry {
   std::vector<double> epoch_log_scale_;  ///< log_scale_ at each epoch.
   std::optional<KeyframeSnapshot> snapshot_;
   std::vector<KeyframePose> keyframes_;
+  std::map<std::uint32_t, KeyframePoints> marginalized_;  ///< By the window's keyframes.
 
   // Shared: the reference.
   mutable std::mutex reference_mutex_;

@@ -77,26 +77,14 @@ TraceState find_segment(const ImageF& image, const HostGeometry& g, const PointC
   return TraceState::kUntraced;
 }
 
-using RotatedPattern = std::array<PatternOffset, kPatternSize>;
-
-/// The pattern warped by the upper 2x2 of K R K^-1.
-RotatedPattern rotate_pattern(const Eigen::Matrix3f& m) {
-  RotatedPattern out;
-  for (std::size_t i = 0; i < kPatternSize; ++i) {
-    out[i] = {m(0, 0) * kPattern[i].x + m(0, 1) * kPattern[i].y,
-              m(1, 0) * kPattern[i].x + m(1, 1) * kPattern[i].y};
-  }
-  return out;
-}
-
-bool fits_border(const RotatedPattern& pattern) {
+bool fits_border(const WarpedPattern& pattern) {
   return std::all_of(pattern.begin(), pattern.end(), [](const PatternOffset& o) {
     return std::abs(o.x) < kMaxPatternOffset && std::abs(o.y) < kMaxPatternOffset;
   });
 }
 
 /// Huber energy of the pattern at (u, v).
-float pattern_energy(const ImageF& image, const RotatedPattern& pattern, const HostGeometry& g,
+float pattern_energy(const ImageF& image, const WarpedPattern& pattern, const HostGeometry& g,
                      const ImmaturePoint& p, float huber, float u, float v) {
   float energy = 0.0F;
   for (std::size_t i = 0; i < kPatternSize; ++i) {
@@ -111,7 +99,7 @@ float pattern_energy(const ImageF& image, const RotatedPattern& pattern, const H
 }
 
 /// Gauss-Newton along the line from (*u, *v). Returns the best energy.
-float refine(const ImageF& image, const RotatedPattern& pattern, const HostGeometry& g,
+float refine(const ImageF& image, const WarpedPattern& pattern, const HostGeometry& g,
              const ImmaturePoint& p, float huber, float dx, float dy, float start_energy, float* u,
              float* v) {
   float best = start_energy;
@@ -124,10 +112,10 @@ float refine(const ImageF& image, const RotatedPattern& pattern, const HostGeome
     float H = 1.0F;
     float b = 0.0F;
     float energy = 0.0F;
+    const LineResiduals line = line_residuals(image, g, pattern, p, *u, *v, dx, dy);
     for (std::size_t i = 0; i < kPatternSize; ++i) {
-      const Sample s = sample_with_gradient(image, *u + pattern[i].x, *v + pattern[i].y);
-      const float r = s.value - (g.gain * p.colour[i] + g.bias);
-      const float slope = dx * s.gx + dy * s.gy;
+      const float r = line.r[i];
+      const float slope = line.slope[i];
       const float magnitude = std::abs(r);
       const float hw = magnitude < huber ? 1.0F : huber / magnitude;
       H += hw * slope * slope;
@@ -195,6 +183,28 @@ HostGeometry host_geometry(const CameraModel& camera, const SE3& T_target_host,
   return g;
 }
 
+WarpedPattern warp_pattern(const HostGeometry& g) {
+  const Eigen::Matrix3f& m = g.KRKi;
+  WarpedPattern out;
+  for (std::size_t i = 0; i < kPatternSize; ++i) {
+    out[i] = {m(0, 0) * kPattern[i].x + m(0, 1) * kPattern[i].y,
+              m(1, 0) * kPattern[i].x + m(1, 1) * kPattern[i].y};
+  }
+  return out;
+}
+
+LineResiduals line_residuals(const ImageF& image, const HostGeometry& g,
+                             const WarpedPattern& pattern, const ImmaturePoint& point, float u,
+                             float v, float dx, float dy) {
+  LineResiduals out;
+  for (std::size_t i = 0; i < kPatternSize; ++i) {
+    const Sample s = sample_with_gradient(image, u + pattern[i].x, v + pattern[i].y);
+    out.r[i] = s.value - (g.gain * point.colour[i] + g.bias);
+    out.slope[i] = dx * s.gx + dy * s.gy;
+  }
+  return out;
+}
+
 bool make_immature_point(const ImageF& image, float u, float v, std::uint8_t type,
                          const PointConfig& config, double gradient_constant, ImmaturePoint* out) {
   if (!in_image(image, u, v, kPatternBorder)) return false;
@@ -238,7 +248,7 @@ TraceState trace(const ImageF& image, const HostGeometry& g, const PointConfig& 
   error = std::min(error, kMaxPixelError);
 
   const auto huber = static_cast<float>(config.huber);
-  const RotatedPattern pattern = rotate_pattern(g.KRKi);
+  const WarpedPattern pattern = warp_pattern(g);
   if (!fits_border(pattern)) return finish(&p, TraceState::kBadCondition);
   const int steps = std::min(static_cast<int>(1.9999F + s.length), kMaxSteps - 1);
   std::array<float, kMaxSteps> energies;

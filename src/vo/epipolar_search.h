@@ -1,8 +1,11 @@
 #pragma once
 
+#include <array>
+
 #include "sovo/geometry/camera_model.h"
 #include "sovo/vo/direct_config.h"
 #include "sovo/vo/immature_point.h"
+#include "sovo/vo/pattern.h"
 #include "sovo/vo/window.h"
 
 namespace sovo {
@@ -16,6 +19,27 @@ struct HostGeometry {
 
 HostGeometry host_geometry(const CameraModel& camera, const SE3& T_target_host,
                            const BrightnessTransfer& transfer);
+
+/// Offsets of the pattern's pixels from its centre in the image that is searched [px].
+using WarpedPattern = std::array<PatternOffset, kPatternSize>;
+
+/// The pattern as the upper 2x2 of K R K^-1 turns and stretches it.
+WarpedPattern warp_pattern(const HostGeometry& geometry);
+
+/// Photometric residuals of a pattern and their derivatives along a line, one a pattern pixel.
+struct LineResiduals {
+  std::array<float, kPatternSize> r;      ///< [grey levels]
+  std::array<float, kPatternSize> slope;  ///< d r / d t [grey levels / px].
+};
+
+/// What Gauss-Newton along the epipolar line needs at (u, v), with the line's unit direction
+/// (dx, dy) and the pattern's warped offsets o_i:
+///   r_i(t) = I((u, v) + t (dx, dy) + o_i) - (gain * colour_i + bias),
+///   dr_i/dt = grad I . (dx, dy), both at t = 0.
+/// The pattern must lie in the image, a pixel from its border.
+LineResiduals line_residuals(const ImageF& image, const HostGeometry& geometry,
+                             const WarpedPattern& pattern, const ImmaturePoint& point, float u,
+                             float v, float dx, float dy);
 
 /// Pattern colours, weights and gradients of a new immature point at pixel (u, v) of `image`.
 /// False when the pattern does not fit into the image or has no finite value.

@@ -49,11 +49,29 @@ class Configuration(CommandTest):
         self.assertEqual(first, second)
 
     def test_command_line_wins_over_file_over_preset(self):
-        path = self.file("preset: fast\nseed: 1\nvo:\n  points:\n    active_points: 900\n")
+        path = self.file("preset: embedded\nseed: 1\nvo:\n  points:\n    active_points: 900\n")
         dump = self.expect(sovo("--config", path, "--set", "seed=2", "config"), OK).stdout
         self.assertIn("seed: 2", dump)
         self.assertIn("active_points: 900", dump)
         self.assertIn("immature_points: 600", dump)
+
+    def test_presets(self):
+        default = self.expect(sovo("config"), OK).stdout.splitlines()
+        changed = {}
+        for name in ("embedded", "default", "quality"):
+            dump = self.expect(sovo("config", "--preset", name), OK).stdout.splitlines()
+            self.assertTrue(dump[0].startswith(f"preset: {name} "), dump[0])
+            changed[name] = [new.split("#")[0].strip()
+                             for old, new in zip(default[1:], dump[1:]) if old != new]
+        self.assertEqual(changed["default"], [])
+        self.assertIn("active_points: 800", changed["embedded"])
+        self.assertEqual(changed["quality"], ["max_iterations: 10"])
+        for refused in (sovo("config", "--preset", "fast"),
+                        sovo("config", "--config", self.file("preset: fast\n"))):
+            self.expect(refused, USAGE)
+            self.assertIn("fast", refused.stderr)
+            for name in changed:
+                self.assertIn(name, refused.stderr)
 
     def test_shipped_example_is_the_default(self):
         dump = self.expect(sovo("config"), OK).stdout

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "sovo/bridge/diagnostics.h"
 #include "test_cameras.h"
 
@@ -144,6 +146,10 @@ TEST(OdometryConversion, KeyframesStandInTheAxesOfOdom) {
   EXPECT_NEAR(m.pose.position.x, 1.0 + A.translation().x(), 1e-12);
   EXPECT_EQ(m.u._buffer, keyframe.u.data());
   EXPECT_NEAR(to_path_pose(keyframe, A, {}).pose.position.x, 1.0, 1e-12);
+  keyframe.log_scale = 0.1;
+  EXPECT_TRUE(std::isnan(to_message(keyframe, A, {}).log_scale)) << "no scale is claimed";
+  keyframe.scale_valid = true;
+  EXPECT_EQ(to_message(keyframe, A, {}).log_scale, 0.1);
 }
 
 TEST(Diagnostics, LostIsAnErrorAndTrackingIsOk) {

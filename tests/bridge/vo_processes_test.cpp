@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "sovo/bridge/command_subscriber.h"
 #include "sovo/bridge/reader.h"
 #include "sovo/bridge/topics.h"
@@ -63,13 +65,52 @@ TEST(VoPublisher, OnlyMetricPosesGoToOdomAndTf) {
   output.scale_valid = true;
   output.state = OdometryState::kTracking;
   publisher->on_frame(output);
-  publisher->on_keyframe({});
+  KeyframeOutput metric;
+  metric.scale_valid = true;
+  publisher->on_keyframe(metric);
   ASSERT_TRUE(eventually([&] { return scaled.count() == 2; }));
   ASSERT_TRUE(eventually([&] { return odom.count() >= 1 && tf.count() >= 1; }));
   ASSERT_TRUE(eventually([&] { return keyframes.count() == 2 && path.count() == 1; }));
   EXPECT_EQ(odom.count(), 1);
   EXPECT_EQ(tf.count(), 1);
   EXPECT_EQ(publisher->failed_writes(), 0U) << publisher->last_failure();
+}
+
+TEST(VoPublisher, ARevisedKeyframeIsWrittenAgainWithItsId) {
+  const Participant vo = open_participant();
+  const Participant other = open_remote_participant();
+  auto publisher = require(VoPublisher::open(vo, {}, SE3()));
+  KeyframeOutput keyframe;
+  keyframe.segment = 2;
+  keyframe.scale_valid = true;
+  for (const std::uint32_t id : {0U, 1U}) {
+    keyframe.id = id;
+    keyframe.T_odom_left.translation().x() = 1.0 + id;
+    keyframe.inverse_depth = {0.5F, 0.25F};
+    publisher->on_keyframe(keyframe);
+  }
+  keyframe.id = 0;
+  keyframe.revised = true;
+  keyframe.T_odom_left.translation().x() = 1.5;
+  keyframe.inverse_depth = {0.4F};
+  publisher->on_keyframe(keyframe);
+
+  // Whoever comes late gets all of them, in their order, and keeps the last of each id.
+  auto reader =
+      require(Reader<msg::Keyframe>::open(other, topics::kKeyframe, topics::kKeyframeQos));
+  std::vector<std::uint32_t> ids;
+  std::map<std::uint32_t, std::pair<double, std::uint32_t>> kept;
+  ASSERT_TRUE(eventually([&] {
+    const auto taken = reader.take_each([&](const msg::Keyframe& m, const dds_sample_info_t&) {
+      EXPECT_EQ(m.segment, 2U);
+      ids.push_back(m.id);
+      kept[m.id] = {m.pose.position.x, m.inverse_depth._length};
+    });
+    return taken.ok() && ids.size() >= 3;
+  }));
+  EXPECT_EQ(ids, (std::vector<std::uint32_t>{0, 1, 0}));
+  EXPECT_EQ(kept[0], std::make_pair(1.5, 1U));
+  EXPECT_EQ(kept[1], std::make_pair(2.0, 2U));
 }
 
 TEST(VoPublisher, TfIsLeftToOthersWhenToldSo) {

@@ -112,6 +112,30 @@ TEST_F(Map, GrowsAlongADriveAndKeepsItsScaleInEverySimilarity) {
   EXPECT_EQ(vo_.keyframes().size(), static_cast<std::size_t>(keyframes));
 }
 
+TEST_F(Map, BeginsAnewWithoutWhatItHeld) {
+  for (int i = 1; i <= 6; ++i) {
+    vo_.map(vo_.track(frame_at(scene_, drive(i), i)), nullptr, nullptr);
+  }
+  ASSERT_GT(vo_.keyframes().size(), 1U);
+  std::vector<StartPoint> points;
+  for (const SelectedPixel& pixel : vo_.select_pixels(first_, 700)) {
+    const double depth = scene_.depth(small_camera(), SE3(), Vec2(pixel.x, pixel.y));
+    points.push_back({pixel, {static_cast<float>(1.0 / depth), static_cast<float>(0.02 / depth)}});
+  }
+  const MonoFrame again = frame_at(scene_, SE3(), 7);
+  vo_.begin(again, SE3(), points);
+  ASSERT_EQ(vo_.keyframes().size(), 1U);
+  EXPECT_EQ(vo_.keyframes()[0].stamp_ns, again.stamp_ns);
+  ASSERT_EQ(vo_.window().size(), 1);
+  EXPECT_EQ(vo_.window().newest().id, 0U);
+  const std::vector<KeyframeState> states = vo_.window_keyframes();
+  ASSERT_EQ(states.size(), 1U);
+  EXPECT_LE(states[0].points.size(), points.size()) << "its own, and no others";
+  const TrackedFrame tracked = vo_.track(frame_at(scene_, drive(1), 8));
+  ASSERT_TRUE(tracked.tracking.good);
+  EXPECT_LT((tracked.T_world_camera.translation() - drive(1).translation()).norm(), 0.02);
+}
+
 TEST_F(Map, CorrectionCountsLessWhatWasAppliedSinceItsSnapshot) {
   for (int i = 1; !vo_.snapshot() && i < 20; ++i) {
     vo_.map(vo_.track(frame_at(scene_, drive(i), i)), nullptr, nullptr);

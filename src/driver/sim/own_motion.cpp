@@ -134,9 +134,9 @@ Motion drive_expressway() {
 }
 
 /// A flight of a small aircraft along the curve `path`, whose parameter at a time is `phase`: it
-/// looks along the curve, `ahead` to `behind` of it, and leans as it speeds up and turns.
+/// looks along the curve, and leans as it speeds up and turns.
 template <class Path, class Phase>
-Motion fly(double duration, Path path, Phase phase, double ahead, double behind) {
+Motion fly(double duration, Path path, Phase phase) {
   return sampled(duration, [=](double t) {
     constexpr double h = 0.05;
     const auto position = [&](double time) { return path(phase(time)); };
@@ -144,7 +144,7 @@ Motion fly(double duration, Path path, Phase phase, double ahead, double behind)
     const Vec3 velocity = (position(t + h) - position(t - h)) / (2.0 * h);
     const Vec3 acceleration = (position(t + h) - 2.0 * p + position(t - h)) / (h * h);
     // It looks where it will be.
-    const Vec3 course = path(phase(t) + ahead) - path(phase(t) - behind);
+    const Vec3 course = path(phase(t) + 2.2) - path(phase(t) - 1.8);
     const double yaw = std::atan2(course.y(), course.x());
     const double side = -std::sin(yaw) * acceleration.x() + std::cos(yaw) * acceleration.y();
     const double forward = std::cos(yaw) * acceleration.x() + std::sin(yaw) * acceleration.y();
@@ -162,13 +162,12 @@ Vec3 loop_of_hall(double u) {
           1.9 + 0.7 * std::sin(1.7 * a + 0.4) + 0.25 * std::sin(4.3 * a)};
 }
 
-/// Loops at up to 2.5 m/s.
+/// Loops at up to 3 m/s.
 Motion fly_loops() {
-  return fly(
-      60.0, loop_of_hall, [](double t) { return t; }, 1.2, 0.6);
+  return fly(60.0, loop_of_hall, [](double t) { return t; });
 }
 
-/// Where the race is on the loops after `t` seconds: half as fast again as `fly_loops`, then a
+/// Where the race is on the loops after `t` seconds: faster than `fly_loops`, then a
 /// sudden end.
 double phase_of_race(double t) {
   constexpr double kRamp = 2.0;    // [s]
@@ -177,11 +176,11 @@ double phase_of_race(double t) {
   const double start = std::min(t, kRamp);
   const double brake = std::clamp(t, kBrake, kStop) - kBrake;
   const double run = std::min(t, kBrake) - start;
-  return 1.5 * (0.5 * start * start / kRamp + run + brake - 0.5 * brake * brake / (kStop - kBrake));
+  return 1.4 * (0.5 * start * start / kRamp + run + brake - 0.5 * brake * brake / (kStop - kBrake));
 }
 
 /// Fast loops that end in standstill for the last six seconds.
-Motion fly_race() { return fly(34.5, loop_of_hall, phase_of_race, 2.2, 1.8); }
+Motion fly_race() { return fly(34.5, loop_of_hall, phase_of_race); }
 
 /// From machine to machine, with a stop at each of them, looking around all the while.
 Motion fly_inspection() {

@@ -10,7 +10,7 @@ namespace sovo::sim {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr int kNothing = -1;
+constexpr int kNothing = TileSamples::kNothing;
 
 /// Eight places in a pixel, no two in one row or column.
 constexpr std::array<std::array<float, 2>, 8> kPlaces = {{{-0.4375F, -0.0625F},
@@ -21,6 +21,27 @@ constexpr std::array<std::array<float, 2>, 8> kPlaces = {{{-0.4375F, -0.0625F},
                                                           {0.1875F, -0.1875F},
                                                           {0.3125F, 0.1875F},
                                                           {0.4375F, -0.4375F}}};
+
+/// Surface that each of a pixel's eight rays meets, and those rays.
+struct EdgeRays {
+  static constexpr std::size_t kCount = kPlaces.size();
+  alignas(32) std::array<float, kCount> dx, dy, dz;
+  alignas(32) std::array<float, kCount> range;
+  alignas(32) std::array<int, kCount> surface;
+};
+
+/// Surfaces of a pixel and the eight around it, each once; returns their number.
+std::size_t distinct(const int* around, int step, std::array<int, 9>* surfaces) {
+  std::size_t count = 0;
+  for (int j = -1; j <= 1; ++j) {
+    for (int i = -1; i <= 1; ++i) {
+      const int s = around[j * step + i];
+      const auto end = surfaces->begin() + static_cast<std::ptrdiff_t>(count);
+      if (s != kNothing && std::find(surfaces->begin(), end, s) == end) (*surfaces)[count++] = s;
+    }
+  }
+  return count;
+}
 
 }  // namespace
 
@@ -62,134 +83,116 @@ void Renderer::find_surfaces() {
         const auto at = static_cast<std::size_t>(tile);
         view_.select(rays_.cone(tile), block_solid, &tile_solid_[at]);
         view_.select(rays_.cone(tile), block_pierced, &tile_pierced_[at]);
-        float* range = range_.data() + at * RayTable::kTilePixels;
-        float farthest = kInfinity;
-        for (const int i : tile_solid_[at]) {
-          const SurfaceView& view = view_.views()[static_cast<std::size_t>(i)];
-          if (view.nearest > farthest) break;
-          cover_tile(view, i, rays_, tile, range, surface_.data() + at * RayTable::kTilePixels);
-          farthest = *std::max_element(range, range + RayTable::kTilePixels);
-        }
+        find_in_tile(tile);
       }
     }
   }
 }
 
-Renderer::Composite Renderer::composite(const Eigen::Vector3f& ray, int tile, int surface,
-                                        float range, float angle) const {
-  struct Cut {
-    float range;
-    int view;
-  };
-  constexpr std::size_t kMost = 32;
-  std::array<Cut, kMost> cuts;
-  std::size_t count = 0;
-  for (const int i : tile_pierced_[static_cast<std::size_t>(tile)]) {
+void Renderer::find_in_tile(int tile) {
+  const auto at = static_cast<std::size_t>(tile);
+  const Rays rays{rays_.dx(tile), rays_.dy(tile), rays_.dz(tile), RayTable::kTilePixels};
+  float* range = range_.data() + at * RayTable::kTilePixels;
+  float farthest = kInfinity;
+  for (const int i : tile_solid_[at]) {
     const SurfaceView& view = view_.views()[static_cast<std::size_t>(i)];
-    if (view.nearest >= range || count == kMost) continue;
-    const float t = range_along(view, ray);
-    if (t >= range) continue;
-    std::size_t k = count++;
-    for (; k > 0 && cuts[k - 1].range > t; --k) cuts[k] = cuts[k - 1];
-    cuts[k] = {t, i};
+    if (view.nearest > farthest) break;
+    cover_rays(view, i, rays, range, surface_.data() + at * RayTable::kTilePixels);
+    farthest = *std::max_element(range, range + RayTable::kTilePixels);
   }
-  Composite result;
-  result.range = kInfinity;
-  float left = 1.0F;
-  for (std::size_t k = 0; k < count && left > 0.02F; ++k) {
-    const SurfaceView& view = view_.views()[static_cast<std::size_t>(cuts[k].view)];
-    const auto sample = shader_.surface(view, ray, cuts[k].range, angle);
-    result.value += left * sample.opacity * sample.value;
-    left *= 1.0F - sample.opacity;
-    const bool decal = scene_->surfaces[static_cast<std::size_t>(view.surface)].decal;
-    if (left < 0.5F && !decal) result.range = std::min(result.range, cuts[k].range);
-  }
-  result.range = std::min(result.range, range);
-  if (left <= 0.02F) return result;
-  const float behind =
-      surface == kNothing
-          ? shader_.sky(ray, angle)
-          : shader_.surface(view_.views()[static_cast<std::size_t>(surface)], ray, range, angle)
-                .value;
-  result.value += left * behind;
-  return result;
 }
 
-bool Renderer::on_edge(int x, int y) const {
+/// Surfaces of a tile's pixels and of those around it; the image's edge repeats its pixels.
+void Renderer::look_around(int x0, int y0, Neighbourhood* around) const {
   const CameraModel& camera = rays_.camera();
-  const int own = surface_at(x, y);
-  return (x > 0 && surface_at(x - 1, y) != own) ||
-         (x + 1 < camera.width && surface_at(x + 1, y) != own) ||
-         (y > 0 && surface_at(x, y - 1) != own) ||
-         (y + 1 < camera.height && surface_at(x, y + 1) != own);
+  for (int j = 0; j < kSide; ++j) {
+    const int y = std::clamp(y0 + j - 1, 0, camera.height - 1);
+    int* row = around->data() + j * kSide;
+    const auto at = [&](int x) { return surface_[rays_.index(std::min(x, camera.width - 1), y)]; };
+    row[0] = at(std::max(0, x0 - 1));
+    const int* own = surface_.data() + rays_.index(x0, y);
+    std::copy(own, own + RayTable::kTile, row + 1);
+    for (int x = camera.width; x < x0 + RayTable::kTile; ++x) row[x - x0 + 1] = at(x);
+    row[kSide - 1] = at(x0 + RayTable::kTile);
+  }
 }
 
 void Renderer::shade_tile(int tile, RenderedImage* image) {
   const CameraModel& camera = rays_.camera();
   const int x0 = tile % rays_.tiles_x() * RayTable::kTile;
   const int y0 = tile / rays_.tiles_x() * RayTable::kTile;
+  const std::vector<int>& pierced = tile_pierced_[static_cast<std::size_t>(tile)];
+  Neighbourhood around;
+  look_around(x0, y0, &around);
+  samples_.clear();
   for (int y = y0; y < std::min(camera.height, y0 + RayTable::kTile); ++y) {
     for (int x = x0; x < std::min(camera.width, x0 + RayTable::kTile); ++x) {
       const std::size_t i = rays_.index(x, y);
+      image->light.at(x, y) = 0.0F;
+      image->range.at(x, y) = range_[i];
       const Eigen::Vector3f ray = rays_.ray(x, y);
-      if (ray.isZero()) {
-        image->light.at(x, y) = 0.0F;
-        image->range.at(x, y) = kInfinity;
-        continue;
-      }
-      const float angle = rays_.pixel_angle(0)[i];
-      const Composite seen = composite(ray, tile, surface_[i], range_[i], angle);
-      image->range.at(x, y) = seen.range;
-      image->light.at(x, y) = on_edge(x, y) ? shade_edge(x, y, tile, angle) : seen.value;
+      if (ray.isZero()) continue;
+      const int* own = around.data() + (y - y0 + 1) * kSide + x - x0 + 1;
+      const bool edge =
+          own[-1] != *own || own[1] != *own || own[-kSide] != *own || own[kSide] != *own;
+      if (edge) add_edge(x, y, own);
+      if (edge && pierced.empty()) continue;
+      samples_.add(y * camera.width + x, {ray, range_[i], *own}, rays_.pixel_angle(0)[i],
+                   edge ? 0.0F : 1.0F);
     }
+  }
+  samples_.shade(*scene_, view_, shader_, pierced);
+  for (int i = 0; i < samples_.count(); ++i) {
+    const auto pixel = static_cast<std::size_t>(samples_.pixel(i));
+    image->light.data()[pixel] += samples_.share(i) * samples_.light(i);
+  }
+  if (pierced.empty()) return;
+  // A pixel's own ray is the last of its rays.
+  for (int i = 0; i < samples_.count(); ++i) {
+    image->range.data()[static_cast<std::size_t>(samples_.pixel(i))] = samples_.range(i);
   }
 }
 
-float Renderer::shade_edge(int x, int y, int tile, float angle) const {
-  const CameraModel& camera = rays_.camera();
+/// A sample for each surface that eight rays through a pixel meet: their mean ray.
+void Renderer::add_edge(int x, int y, const int* around) {
   std::array<int, 9> near{};
-  std::size_t num_near = 0;
-  for (int j = std::max(0, y - 1); j <= std::min(camera.height - 1, y + 1); ++j) {
-    for (int i = std::max(0, x - 1); i <= std::min(camera.width - 1, x + 1); ++i) {
-      const int s = surface_at(i, j);
-      const auto end = near.begin() + static_cast<std::ptrdiff_t>(num_near);
-      if (s != kNothing && std::find(near.begin(), end, s) == end) near[num_near++] = s;
-    }
-  }
-  std::array<Part, kPlaces.size()> parts;
-  std::size_t num_parts = 0;
+  const std::size_t num_near = distinct(around, kSide, &near);
+  const Eigen::Vector3f centre = rays_.ray(x, y);
   const Eigen::Vector3f step_x = rays_.ray_step_x(x, y);
   const Eigen::Vector3f step_y = rays_.ray_step_y(x, y);
-  for (const auto& place : kPlaces) {
-    const Eigen::Vector3f ray = rays_.ray(x, y) + place[0] * step_x + place[1] * step_y;
-    int nearest = kNothing;
-    float range = kInfinity;
-    for (std::size_t k = 0; k < num_near; ++k) {
-      const float t = range_along(view_.views()[static_cast<std::size_t>(near[k])], ray);
-      if (t < range) {
-        range = t;
-        nearest = near[k];
-      }
-    }
-    std::size_t k = 0;
-    while (k < num_parts && parts[k].surface != nearest) ++k;
-    if (k == num_parts) parts[num_parts++].surface = nearest;
-    ++parts[k].count;
-    parts[k].ray += ray;
+  EdgeRays rays;
+  for (std::size_t k = 0; k < EdgeRays::kCount; ++k) {
+    const Eigen::Vector3f ray = centre + kPlaces[k][0] * step_x + kPlaces[k][1] * step_y;
+    rays.dx[k] = ray.x();
+    rays.dy[k] = ray.y();
+    rays.dz[k] = ray.z();
   }
-  float value = 0.0F;
-  for (std::size_t k = 0; k < num_parts; ++k) {
-    const Eigen::Vector3f ray = parts[k].ray.normalized();
-    float range = kInfinity;
-    int surface = parts[k].surface;
-    if (surface != kNothing) {
-      range = range_along(view_.views()[static_cast<std::size_t>(surface)], ray);
-      if (range == kInfinity) surface = kNothing;
-    }
-    const float share = static_cast<float>(parts[k].count) / static_cast<float>(kPlaces.size());
-    value += share * composite(ray, tile, surface, range, angle).value;
+  rays.range.fill(kInfinity);
+  rays.surface.fill(kNothing);
+  for (std::size_t k = 0; k < num_near; ++k) {
+    cover_rays(view_.views()[static_cast<std::size_t>(near[k])], near[k],
+               {rays.dx.data(), rays.dy.data(), rays.dz.data(), static_cast<int>(EdgeRays::kCount)},
+               rays.range.data(), rays.surface.data());
   }
-  return value;
+  std::array<bool, EdgeRays::kCount> done{};
+  for (std::size_t k = 0; k < EdgeRays::kCount; ++k) {
+    if (done[k]) continue;
+    int count = 0;
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    for (std::size_t i = k; i < EdgeRays::kCount; ++i) {
+      if (rays.surface[i] != rays.surface[k]) continue;
+      sum += Eigen::Vector3f(rays.dx[i], rays.dy[i], rays.dz[i]);
+      done[i] = true;
+      ++count;
+    }
+    TileSamples::Hit hit{sum.normalized(), kInfinity, rays.surface[k]};
+    if (hit.surface != kNothing) {
+      hit.range = range_along(view_.views()[static_cast<std::size_t>(hit.surface)], hit.ray);
+      if (hit.range == kInfinity) hit.surface = kNothing;
+    }
+    samples_.add(y * rays_.camera().width + x, hit, rays_.pixel_angle(0)[rays_.index(x, y)],
+                 static_cast<float>(count) / static_cast<float>(EdgeRays::kCount));
+  }
 }
 
 void Renderer::draw_particles(const SE3& T_world_camera, double t, RenderedImage* image) const {

@@ -6,6 +6,7 @@
 #include "sovo/driver/sim/ray_table.h"
 #include "sovo/driver/sim/scene_view.h"
 #include "sovo/driver/sim/shader.h"
+#include "sovo/driver/sim/tile_samples.h"
 #include "sovo/image/image.h"
 
 namespace sovo::sim {
@@ -35,32 +36,23 @@ class Renderer {
   const RayTable& rays() const { return rays_; }
 
  private:
-  struct Composite {
-    float value = 0.0F;
-    float range = 0.0F;
-  };
-  /// A surface that some of a pixel's eight rays meet.
-  struct Part {
-    int surface = -1;
-    int count = 0;
-    Eigen::Vector3f ray = Eigen::Vector3f::Zero();  ///< Sum of those rays.
-  };
+  static constexpr int kSide = RayTable::kTile + 2;  ///< A tile with the pixels around it.
+  using Neighbourhood = std::array<int, static_cast<std::size_t>(kSide) * kSide>;
 
   void find_surfaces();
+  void find_in_tile(int tile);
   void shade_tile(int tile, RenderedImage* image);
-  Composite composite(const Eigen::Vector3f& ray, int tile, int surface, float range,
-                      float angle) const;
-  bool on_edge(int x, int y) const;
-  float shade_edge(int x, int y, int tile, float angle) const;
+  void look_around(int x0, int y0, Neighbourhood* around) const;
+  void add_edge(int x, int y, const int* around);
   void draw_particles(const SE3& T_world_camera, double t, RenderedImage* image) const;
-  int surface_at(int x, int y) const { return surface_[rays_.index(x, y)]; }
 
   const Scene* scene_;
   RayTable rays_;
   SceneView view_;
   Shader shader_;
-  AlignedVector<float> range_;  ///< In the order of the ray table.
-  AlignedVector<int> surface_;
+  TileSamples samples_;
+  AlignedVector<float> range_;                ///< In the order of the ray table.
+  AlignedVector<int> surface_;                ///< Index of a view.
   std::vector<std::vector<int>> tile_solid_;  ///< What each tile may see.
   std::vector<std::vector<int>> tile_pierced_;
 };

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "sovo/driver/sim/kernel.h"
+
 namespace sovo::sim {
 namespace {
 
@@ -46,16 +48,19 @@ SurfaceView view_of(const Surface& s, int index, const SE3& T_camera_world) {
   return view;
 }
 
-void cover_quad(const SurfaceView& view, int index, const float* __restrict dx,
-                const float* __restrict dy, const float* __restrict dz, float* __restrict range,
-                int* __restrict surface) {
+SOVO_SIM_KERNEL void cover_quad(const SurfaceView& view, int index, const Rays& rays,
+                                float* __restrict range, int* __restrict surface) {
+  const float* const __restrict dx = rays.dx;
+  const float* const __restrict dy = rays.dy;
+  const float* const __restrict dz = rays.dz;
+  const int count = rays.count;
   const float n0 = view.n[0], n1 = view.n[1], n2 = view.n[2];
   const float u0 = view.u[0], u1 = view.u[1], u2 = view.u[2];
   const float v0 = view.v[0], v1 = view.v[1], v2 = view.v[2];
   const auto fu = static_cast<float>(view.foot_u);
   const auto fv = static_cast<float>(view.foot_v);
   const float hu = view.half_u, hv = view.half_v, height = -view.height;
-  for (int k = 0; k < RayTable::kTilePixels; ++k) {
+  for (int k = 0; k < count; ++k) {
     const float t = height / (n0 * dx[k] + n1 * dy[k] + n2 * dz[k]);
     const float x = fu + t * (u0 * dx[k] + u1 * dy[k] + u2 * dz[k]);
     const float y = fv + t * (v0 * dx[k] + v1 * dy[k] + v2 * dz[k]);
@@ -65,14 +70,17 @@ void cover_quad(const SurfaceView& view, int index, const float* __restrict dx,
   }
 }
 
-void cover_cylinder(const SurfaceView& view, int index, const float* __restrict dx,
-                    const float* __restrict dy, const float* __restrict dz, float* __restrict range,
-                    int* __restrict surface) {
+SOVO_SIM_KERNEL void cover_cylinder(const SurfaceView& view, int index, const Rays& rays,
+                                    float* __restrict range, int* __restrict surface) {
+  const float* const __restrict dx = rays.dx;
+  const float* const __restrict dy = rays.dy;
+  const float* const __restrict dz = rays.dz;
+  const int count = rays.count;
   const float a0 = view.v[0], a1 = view.v[1], a2 = view.v[2];
   const float c0 = view.centre[0], c1 = view.centre[1], c2 = view.centre[2];
   const float w0 = view.side[0], w1 = view.side[1], w2 = view.side[2];
   const float r2 = view.half_u * view.half_u, half = view.half_v, along = view.along;
-  for (int k = 0; k < RayTable::kTilePixels; ++k) {
+  for (int k = 0; k < count; ++k) {
     const float ad = a0 * dx[k] + a1 * dy[k] + a2 * dz[k];
     const float a = 1.0F - ad * ad;
     const float b = c0 * dx[k] + c1 * dy[k] + c2 * dz[k] - ad * along;
@@ -106,10 +114,12 @@ float range_along(const SurfaceView& view, const Eigen::Vector3f& d) {
   return t > kNear && std::abs(t * ad - view.along) <= view.half_v ? t : kInfinity;
 }
 
-void cover_tile(const SurfaceView& view, int index, const RayTable& rays, int tile, float* range,
-                int* surface) {
-  const auto cover = view.shape == Shape::kQuad ? cover_quad : cover_cylinder;
-  cover(view, index, rays.dx(tile), rays.dy(tile), rays.dz(tile), range, surface);
+void cover_rays(const SurfaceView& view, int index, const Rays& rays, float* range, int* surface) {
+  if (view.shape == Shape::kQuad) {
+    cover_quad(view, index, rays, range, surface);
+  } else {
+    cover_cylinder(view, index, rays, range, surface);
+  }
 }
 
 void SceneView::update(const SE3& T_world_camera) {

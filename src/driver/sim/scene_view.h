@@ -30,10 +30,16 @@ struct SurfaceView {
 /// Range at which `ray` (unit, or nearly) meets the surface, or infinity.
 float range_along(const SurfaceView& view, const Eigen::Vector3f& ray);
 
-/// Lowers `range`, and sets `surface` to `index`, at all rays of a tile that meet the surface
-/// before that.
-void cover_tile(const SurfaceView& view, int index, const RayTable& rays, int tile, float* range,
-                int* surface);
+/// Components of unit rays, in the camera's frame.
+struct Rays {
+  const float* dx;
+  const float* dy;
+  const float* dz;
+  int count;
+};
+
+/// Lowers `range`, and sets `surface` to `index`, at all rays that meet the surface before that.
+void cover_rays(const SurfaceView& view, int index, const Rays& rays, float* range, int* surface);
 
 /// What of a scene a camera may see from where it is, nearest first.
 class SceneView {

@@ -1,11 +1,13 @@
 #pragma once
 
+#include "sovo/driver/sim/pattern_lookup.h"
+#include "sovo/driver/sim/ray_batch.h"
 #include "sovo/driver/sim/scene_view.h"
 
 namespace sovo::sim {
 
 /// Light that leaves surfaces towards a camera; patterns are looked up at the resolution at which
-/// a pixel sees them.
+/// a pixel sees them. Batches must not be empty; the shader pads them.
 class Shader {
  public:
   explicit Shader(const Scene& scene) : scene_(&scene) {}
@@ -13,24 +15,19 @@ class Shader {
   /// Moves the camera, and the water, to time `t` [s].
   void update(const SE3& T_world_camera, double t);
 
-  /// Light from where `ray` meets the surface at `range`, and how much of it is covered there.
-  struct Sample {
-    float value = 0.0F;
-    float opacity = 1.0F;
-  };
-  Sample surface(const SurfaceView& view, const Eigen::Vector3f& ray, float range,
-                 float pixel_angle) const;
+  /// Light from where rays meet a surface.
+  void light(const SurfaceView& view, RayBatch* rays, BatchFloats* light) const;
 
-  /// Light from beyond all surfaces.
-  float sky(const Eigen::Vector3f& ray, float pixel_angle) const;
+  /// How much of a surface with holes is covered where rays meet it, 0 to 1.
+  void cover(const SurfaceView& view, RayBatch* rays, BatchFloats* opacity) const;
+
+  /// Light from beyond all surfaces; the rays' range is not used.
+  void sky(RayBatch* rays, BatchFloats* light) const;
 
  private:
-  struct Spot;
-  Spot spot(const SurfaceView& view, const Eigen::Vector3f& ray, float range,
-            float pixel_angle) const;
-  float pattern(const Layer& l, const Spot& p) const;
-  float reflected(const Material& material, const Spot& spot) const;
-  float caustics(const Spot& p) const;
+  void reflect(const Material& material, const Spots& spots, BatchFloats* light) const;
+  void add_caustics(const Spots& spots, BatchFloats* light) const;
+  float sky_of(const Eigen::Vector3f& ray, float pixel_angle) const;
   float hills(double azimuth, double elevation, float pixel_angle, float beyond) const;
 
   const Scene* scene_;

@@ -18,35 +18,31 @@ ImageF halved(const ImageF& image) {
 }
 
 /// Every texel with its neighbours to the right and below; beyond the edge the pattern repeats.
-std::vector<std::uint32_t> quads(const ImageF& image) {
+void append_quads(const ImageF& image, std::vector<std::uint32_t>* quads) {
   const int size = image.width();
   const auto texel = [&](int x, int y) {
     const float value = std::clamp(image.at(x & (size - 1), y & (size - 1)), 0.0F, 1.0F);
     return static_cast<std::uint32_t>(value * 255.0F + 0.5F);
   };
-  std::vector<std::uint32_t> result;
-  result.reserve(image.size());
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
-      result.push_back(texel(x, y) | texel(x + 1, y) << 8 | texel(x, y + 1) << 16 |
+      quads->push_back(texel(x, y) | texel(x + 1, y) << 8 | texel(x, y + 1) << 16 |
                        texel(x + 1, y + 1) << 24);
     }
   }
-  return result;
 }
 
 }  // namespace
 
 Texture::Texture(const ImageF& pattern) {
-  ImageF image = pattern;
-  while (true) {
-    const auto size = static_cast<std::uint32_t>(image.width());
-    const auto half = static_cast<std::uint32_t>((std::uint64_t{1} << 31) / size);
-    levels_.push_back({size, half, quads(image)});
-    if (size == 1) break;
-    image = halved(image);
-  }
-  mean_ = std::clamp(image.at(0, 0), 0.0F, 1.0F);
+  std::vector<ImageF> levels{pattern};
+  while (levels.back().width() > 1) levels.push_back(halved(levels.back()));
+  log_size_ = static_cast<int>(levels.size()) - 1;
+  mean_ = std::clamp(levels.back().at(0, 0), 0.0F, 1.0F);
+  levels.pop_back();
+  quads_.reserve(2 * pattern.size());
+  for (auto level = levels.rbegin(); level != levels.rend(); ++level) append_quads(*level, &quads_);
+  quads_.shrink_to_fit();
 }
 
 }  // namespace sovo::sim

@@ -23,25 +23,25 @@ inline std::uint32_t texture_fraction(double x) {
 /// that it can be looked up at the resolution at which it is seen. Values are in [0, 1].
 class Texture {
  public:
-  /// `pattern`: square, the side a power of two.
+  /// `pattern`: square, the side a power of two and at least 4.
   explicit Texture(const ImageF& pattern);
 
   /// Texels along the side.
-  int size() const { return 1 << (num_levels() - 1); }
-  int num_levels() const { return static_cast<int>(levels_.size()); }
+  int size() const { return 1 << log_size_; }
+  int log_size() const { return log_size_; }
   float mean() const { return mean_; }
 
   /// Value where one texel of the resolution looked up is 2^level / size() wide; linear between
   /// texels (in steps of 1/256 of them) and between levels.
   float sample(TexturePlace place, float level) const {
-    constexpr float kScale = 1.0F / (255.0F * 65536.0F);
-    if (level <= 0.0F) return kScale * static_cast<float>(bilinear(0, place));
+    if (level <= 0.0F) return kScale * texel(quads(), log_size_, place);
     const int lower = static_cast<int>(level);
-    if (lower + 1 >= num_levels()) return mean_;
+    if (lower >= log_size_) return mean_;
     const float w = level - static_cast<float>(lower);
-    const auto fine = static_cast<float>(bilinear(lower, place));
-    const auto coarse = static_cast<float>(bilinear(lower + 1, place));
-    return kScale * (fine + w * (coarse - fine));
+    const float fine = kScale * texel(quads(), log_size_ - lower, place);
+    const bool last = lower + 1 == log_size_;
+    const float coarse = last ? mean_ : kScale * texel(quads(), log_size_ - lower - 1, place);
+    return fine + w * (coarse - fine);
   }
 
   /// As above, at fractions of the side.
@@ -49,33 +49,38 @@ class Texture {
     return sample(TexturePlace{texture_fraction(u), texture_fraction(v)}, level);
   }
 
- private:
-  struct Level {
-    std::uint32_t size = 1;
-    std::uint32_t half_texel = 0;  ///< In units of `TexturePlace`.
-    /// Every entry has the texel, its right neighbour, and the two below them, in this order from
-    /// the lowest byte on.
-    std::vector<std::uint32_t> quads;
-  };
+  /// All levels of at least 2 x 2 texels, the coarsest first. Every entry has a texel, its right
+  /// neighbour, and the two below them, in this order from the lowest byte on.
+  const std::uint32_t* quads() const { return quads_.data(); }
 
-  /// 255 * 65536 times the value.
-  int bilinear(int level, TexturePlace place) const {
-    const Level& l = levels_[static_cast<std::size_t>(level)];
-    // Texel centres are at half texels. The upper words are the texel, what follows the place in
+  /// `1 / kScale` times the value in the level of 2^log_side texels a side, 1 <= log_side.
+  static float texel(const std::uint32_t* quads, int log_side, TexturePlace place) {
+    const auto side = static_cast<std::uint32_t>(log_side);
+    // Texel centres are at half texels. The upper bits are the texel, what follows the place in
     // it.
-    const std::uint64_t u = std::uint64_t{place.u - l.half_texel} * l.size;
-    const std::uint64_t v = std::uint64_t{place.v - l.half_texel} * l.size;
-    const std::uint32_t fu = static_cast<std::uint32_t>(u) >> 24;
-    const std::uint32_t fv = static_cast<std::uint32_t>(v) >> 24;
-    const std::uint32_t quad = l.quads[(v >> 32) * l.size + (u >> 32)];
+    const std::uint32_t u = place.u - (0x80000000U >> side);
+    const std::uint32_t v = place.v - (0x80000000U >> side);
+    const std::uint32_t fu = (u << side) >> 24;
+    const std::uint32_t fv = (v << side) >> 24;
+    const std::uint32_t quad =
+        quads[first_of(side) + ((v >> (32U - side)) << side) + (u >> (32U - side))];
     // The upper and the lower pair at once, in the two halves of a word.
     const std::uint32_t left = quad & 0x00FF00FFU;
     const std::uint32_t right = quad >> 8 & 0x00FF00FFU;
     const std::uint32_t rows = left * (256U - fu) + right * fu;
-    return static_cast<int>((rows & 0xFFFFU) * (256U - fv) + (rows >> 16) * fv);
+    const std::uint32_t sum = (rows & 0xFFFFU) * (256U - fv) + (rows >> 16) * fv;
+    return static_cast<float>(static_cast<std::int32_t>(sum));
+  }
+  static constexpr float kScale = 1.0F / (255.0F * 65536.0F);
+
+ private:
+  /// Texels of all coarser levels: 4 + 16 + ... + 4^(log_side - 1).
+  static std::uint32_t first_of(std::uint32_t log_side) {
+    return (0x55555555U >> (32U - 2U * log_side)) - 1U;
   }
 
-  std::vector<Level> levels_;  ///< From the finest to one texel.
+  std::vector<std::uint32_t> quads_;
+  int log_size_ = 0;
   float mean_ = 0.0F;
 };
 

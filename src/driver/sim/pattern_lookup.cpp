@@ -23,6 +23,8 @@ struct Lookups {
   alignas(32) BatchFloats share;   ///< Of one probe.
   alignas(32) BatchFloats blend;   ///< With the coarser level.
   alignas(32) BatchFloats detail;  ///< What is left of it before the mean.
+  int most_probes = 1;
+  bool blended = true;  ///< Some take more than one texel's neighbourhood.
 };
 
 /// The pattern's map in single precision, its shift folded into the place of the foot.
@@ -48,6 +50,8 @@ SOVO_SIM_KERNEL void place(const FlatMap& map, const SpotPlaces& places, const S
   const auto top = static_cast<float>(m.log_size);
   const int coarsest = m.log_size - 2;
   const auto end = static_cast<std::size_t>(spots.end);
+  int most = 1;
+  int highest = 0;
   for (std::size_t i = 0; i < end; ++i) {
     const bool magnified = spots.log_long[i] + m.log_texels <= 0.0F;
     const int probes = magnified ? 1 : spots.probes[i];
@@ -70,7 +74,11 @@ SOVO_SIM_KERNEL void place(const FlatMap& map, const SpotPlaces& places, const S
     lookups->v[i] = m.foot.v + to_place(m.xv * x[i] + m.yv * y[i]) - half_v * back;
     lookups->step_u[i] = half_u * 2U;
     lookups->step_v[i] = half_v * 2U;
+    most = most > probes ? most : probes;
+    highest |= level > 0.0F ? 1 : 0;
   }
+  lookups->most_probes = most;
+  lookups->blended = highest != 0 || most > 1;
 }
 
 SOVO_SIM_KERNEL void add_probe(const std::uint32_t* __restrict quads, int probe, int end,
@@ -84,6 +92,14 @@ SOVO_SIM_KERNEL void add_probe(const std::uint32_t* __restrict quads, int probe,
     sum[i] += probe < l.probes[i] ? value : 0.0F;
     l.u[i] += l.step_u[i];
     l.v[i] += l.step_v[i];
+  }
+}
+
+/// The only probe of spots that are all finer than the pattern.
+SOVO_SIM_KERNEL void look_closely(const std::uint32_t* __restrict quads, int log_size, int end,
+                                  const Lookups& lookups, float* __restrict sum) {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(end); ++i) {
+    sum[i] = Texture::texel(quads, log_size, {lookups.u[i], lookups.v[i]});
   }
 }
 
@@ -102,9 +118,13 @@ void look_up(const Texture& texture, const PatternMap& map, const SpotPlaces& pl
                      texture.log_size()};
   Lookups lookups;
   place(flat, places, spots, &lookups);
-  std::fill(result->begin(), result->begin() + spots.end, 0.0F);
-  for (int k = 0; k < spots.most_probes; ++k) {
-    add_probe(texture.quads(), k, spots.end, &lookups, result->data());
+  if (lookups.blended) {
+    std::fill(result->begin(), result->begin() + spots.end, 0.0F);
+    for (int k = 0; k < lookups.most_probes; ++k) {
+      add_probe(texture.quads(), k, spots.end, &lookups, result->data());
+    }
+  } else {
+    look_closely(texture.quads(), texture.log_size(), spots.end, lookups, result->data());
   }
   const float mean = texture.mean();
   for (std::size_t i = 0; i < static_cast<std::size_t>(spots.end); ++i) {

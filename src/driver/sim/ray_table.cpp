@@ -12,7 +12,7 @@ RayTable::RayTable(const CameraModel& camera)
       tiles_y_((camera.height + kTile - 1) / kTile) {
   const std::size_t count = offset(num_tiles());
   for (auto* values : {&dx_, &dy_, &dz_, &angle_}) values->assign(count, 0.0F);
-  steps_.resize(count);
+  for (auto& values : steps_) values.assign(count, 0.0F);
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
       const auto ray = camera.unproject({x, y});
@@ -27,7 +27,7 @@ RayTable::RayTable(const CameraModel& camera)
     for (int x = 0; x < camera.width; ++x) {
       const float area = ray_step_x(x, y).cross(ray_step_y(x, y)).norm();
       angle_[index(x, y)] = std::sqrt(std::max(1e-12F, area));
-      steps_[index(x, y)] = pixel_step_of(x, y);
+      store_pixel_step(x, y);
     }
   }
   for (int t = 0; t < num_tiles(); ++t) {
@@ -59,18 +59,19 @@ Eigen::Vector3f RayTable::ray_step_y(int x, int y) const {
 }
 
 /// The pseudo-inverse of the two columns of ray steps.
-RayTable::PixelStep RayTable::pixel_step_of(int x, int y) const {
+void RayTable::store_pixel_step(int x, int y) {
   const Eigen::Vector3f a = ray_step_x(x, y);
   const Eigen::Vector3f b = ray_step_y(x, y);
   const float aa = a.dot(a), ab = a.dot(b), bb = b.dot(b);
   const float determinant = aa * bb - ab * ab;
-  PixelStep step;
-  if (!(determinant > 0.0F)) return step;
+  if (!(determinant > 0.0F)) return;
   const Eigen::Vector3f px = (bb * a - ab * b) / determinant;
   const Eigen::Vector3f py = (aa * b - ab * a) / determinant;
-  step.x = {px.x(), px.y(), px.z()};
-  step.y = {py.x(), py.y(), py.z()};
-  return step;
+  const std::size_t i = index(x, y);
+  for (std::size_t k = 0; k < 3; ++k) {
+    steps_[k][i] = px[static_cast<Eigen::Index>(k)];
+    steps_[k + 3][i] = py[static_cast<Eigen::Index>(k)];
+  }
 }
 
 RayCone RayTable::cone_of(int x0, int y0, int side) const {

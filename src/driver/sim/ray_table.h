@@ -56,26 +56,23 @@ class RayTable {
     const std::size_t i = index(x, y);
     return {dx_[i], dy_[i], dz_[i]};
   }
-  /// How a change of the ray moves the pixel: rows of d x / d ray and d y / d ray; zero where the
-  /// camera sees nothing.
-  struct PixelStep {
-    std::array<float, 3> x{}, y{};
-  };
-  const PixelStep& pixel_step(int x, int y) const { return steps_[index(x, y)]; }
+  /// How a change of the ray moves the pixel, for the pixels of a tile: elements k of d x / d ray,
+  /// and from k = 3 on of d y / d ray; zero where the camera sees nothing.
+  const float* pixel_step(int tile, std::size_t k) const { return steps_[k].data() + offset(tile); }
   /// Change of the ray from pixel to pixel along x and y; the image's edge repeats its neighbours.
   Eigen::Vector3f ray_step_x(int x, int y) const;
   Eigen::Vector3f ray_step_y(int x, int y) const;
 
  private:
   static std::size_t offset(int tile) { return static_cast<std::size_t>(tile) * kTilePixels; }
-  PixelStep pixel_step_of(int x, int y) const;
+  void store_pixel_step(int x, int y);
   RayCone cone_of(int x0, int y0, int side) const;
 
   CameraModel camera_;
   int tiles_x_;
   int tiles_y_;
   AlignedVector<float> dx_, dy_, dz_, angle_;
-  std::vector<PixelStep> steps_;
+  std::array<AlignedVector<float>, 6> steps_;
   std::vector<RayCone> cones_;
   std::vector<RayCone> blocks_;
 };

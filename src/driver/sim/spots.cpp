@@ -54,7 +54,6 @@ void cut_cylinder(const SurfaceView& view, const RayBatch& rays, int end, Spots*
 /// The ellipses and their probes from what the rays have along the surface's axes.
 SOVO_SIM_KERNEL void measure(const RayBatch& rays, int end, Spots* spots) {
   Spots& s = *spots;
-  int most = 1;
   for (std::size_t i = 0; i < static_cast<std::size_t>(end); ++i) {
     const float cosine = std::max(0.02F, std::abs(s.cosine[i]));
     const float du = s.along_x[i], dv = s.along_y[i];
@@ -69,9 +68,7 @@ SOVO_SIM_KERNEL void measure(const RayBatch& rays, int end, Spots* spots) {
     s.share[i] = 1.0F / static_cast<float>(probes);
     s.log_long[i] = log2_of(std::max(1e-9F, longer));
     s.log_probe[i] = log2_of(std::max(1e-9F, std::max(diameter, longer * s.share[i])));
-    most = std::max(most, probes);
   }
-  s.most_probes = most;
 }
 
 SOVO_SIM_KERNEL void rotate(const float* rotation, const RayBatch& rays, float ax, float ay,

@@ -26,7 +26,6 @@ struct Spots {
   alignas(32) BatchFloats share;      ///< 1 / probes
   alignas(32) BatchFloats log_long;   ///< log2 of the long diameter [m].
   alignas(32) BatchFloats log_probe;  ///< log2 of the diameter of one [m].
-  int most_probes = 1;
 };
 
 /// Logarithm to base 2, linear between powers of two.

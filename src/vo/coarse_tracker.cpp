@@ -68,6 +68,14 @@ void CoarseTracker::Warped::reserve(std::size_t size) {
   }
 }
 
+CoarseTracker::Warp::Warp(const CameraModel& camera, const SE3& T)
+    : RKi((T.rotation_matrix() * camera.matrix().inverse()).cast<float>()),
+      t(T.translation().cast<float>()),
+      fx(static_cast<float>(camera.fx)),
+      fy(static_cast<float>(camera.fy)),
+      cx(static_cast<float>(camera.cx)),
+      cy(static_cast<float>(camera.cy)) {}
+
 CoarseTracker::Projected CoarseTracker::project(const ReferenceLevel& level, std::size_t i,
                                                 const ImageF& image, const Warp& warp) {
   // The last points may not fill a lane.
@@ -119,14 +127,7 @@ CoarseTracker::Projected CoarseTracker::project(const ReferenceLevel& level, std
 double CoarseTracker::residuals(const ReferenceLevel& level, const ImageF& image, const SE3& T,
                                 const BrightnessTransfer& transfer, double cutoff,
                                 Linearization* out) {
-  const Warp warp{
-      (T.rotation_matrix() * level.camera.matrix().inverse()).cast<float>(),
-      T.translation().cast<float>(),
-      static_cast<float>(level.camera.fx),
-      static_cast<float>(level.camera.fy),
-      static_cast<float>(level.camera.cx),
-      static_cast<float>(level.camera.cy),
-  };
+  const Warp warp(level.camera, T);
   const auto gain = static_cast<float>(transfer.gain);
   const auto bias = static_cast<float>(transfer.bias);
   const Lane huber = lane_of(static_cast<float>(config_.huber));

@@ -78,6 +78,7 @@ class CoarseTracker {
 
   /// Motion and camera of a level, as the residuals want them.
   struct Warp {
+    Warp(const CameraModel& camera, const SE3& T);
     Eigen::Matrix3f RKi;
     Eigen::Vector3f t;
     float fx, fy, cx, cy;

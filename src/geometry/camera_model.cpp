@@ -14,7 +14,7 @@ struct Distorted {
   bool monotonic;  ///< False past the radius where the model folds back.
 };
 
-Distorted distort_radtan(const std::array<double, 8>& d, const Vec2& m) {
+inline Distorted distort_radtan(const std::array<double, 8>& d, const Vec2& m) {
   const double x = m.x();
   const double y = m.y();
   const double k1 = d[0], k2 = d[1], p1 = d[2], p2 = d[3], k3 = d[4], k4 = d[5], k5 = d[6],
@@ -24,8 +24,9 @@ Distorted distort_radtan(const std::array<double, 8>& d, const Vec2& m) {
   const double den = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6));
   const double num_d = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);
   const double den_d = k4 + r2 * (2.0 * k5 + r2 * 3.0 * k6);
-  const double g = num / den;
-  const double g_d = (num_d * den - num * den_d) / (den * den);  // dg / d(r^2)
+  const double inverse = 1.0 / den;
+  const double g = num * inverse;
+  const double g_d = (num_d - g * den_d) * inverse;  // dg / d(r^2)
 
   Distorted out;
   out.point = {x * g + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),

@@ -1,6 +1,12 @@
 #pragma once
 
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
+
+#ifdef __SSE__
+#include <xmmintrin.h>
+#endif
 
 #include "sovo/image/image.h"
 
@@ -18,6 +24,27 @@ inline Lane load_lane(const float* p) {
 }
 inline void store_lane(Lane v, float* p) { __builtin_memcpy(p, &v, sizeof(v)); }
 inline Lane lane_of(float x) { return Lane{x, x, x, x}; }
+/// Four whole numbers; as the result of a comparison -1 where it holds, else 0.
+using LaneMask = std::int32_t __attribute__((vector_size(16)));
+
+/// Whether a comparison holds in all four lanes.
+inline bool all_of(LaneMask mask) { return (mask[0] & mask[1] & mask[2] & mask[3]) != 0; }
+/// Whether it holds in none.
+inline bool none_of(LaneMask mask) { return (mask[0] | mask[1] | mask[2] | mask[3]) == 0; }
+/// The lesser; b where one is not a number.
+inline Lane min_lane(Lane a, Lane b) { return a < b ? a : b; }
+inline Lane abs_lane(Lane v) {
+  const LaneMask magnitude = {0x7fffffff, 0x7fffffff, 0x7fffffff, 0x7fffffff};
+  return reinterpret_cast<Lane>(reinterpret_cast<LaneMask>(v) & magnitude);
+}
+inline Lane sqrt_lane(Lane v) {
+#ifdef __SSE__
+  return _mm_sqrt_ps(v);
+#else
+  return Lane{std::sqrt(v[0]), std::sqrt(v[1]), std::sqrt(v[2]), std::sqrt(v[3])};
+#endif
+}
+
 /// Sum in a fixed order.
 inline float sum_lane(Lane v) { return (v[0] + v[1]) + (v[2] + v[3]); }
 
@@ -33,32 +60,66 @@ inline void transpose(Lane* a, Lane* b, Lane* c, Lane* d) {
   *d = __builtin_shufflevector(ab_high, cd_high, 2, 3, 6, 7);
 }
 
+/// `sum_lane` of each.
+inline Lane sum_lanes(Lane a, Lane b, Lane c, Lane d) {
+  transpose(&a, &b, &c, &d);
+  return (a + b) + (c + d);
+}
+
+/// `sample` of interpolation.h at four positions at once, bit for bit the same. All four must
+/// satisfy its precondition.
+inline Lane sample_lanes(const ImageF& image, Lane x, Lane y) {
+  const LaneMask ix = __builtin_convertvector(x, LaneMask);
+  const LaneMask iy = __builtin_convertvector(y, LaneMask);
+  const Lane fx = x - __builtin_convertvector(ix, Lane);
+  const Lane fy = y - __builtin_convertvector(iy, Lane);
+  const std::ptrdiff_t w = image.width();
+  // Two neighbours in a row are loaded as one double.
+  using Pairs = double __attribute__((vector_size(16)));
+  Pairs upper[2];
+  Pairs lower[2];
+  for (std::size_t i = 0; i < kLanes; ++i) {
+    const float* pixel = image.data() + iy[i] * w + ix[i];
+    __builtin_memcpy(reinterpret_cast<char*>(&upper[i / 2]) + 8 * (i % 2), pixel, 8);
+    __builtin_memcpy(reinterpret_cast<char*>(&lower[i / 2]) + 8 * (i % 2), pixel + w, 8);
+  }
+  const auto u0 = reinterpret_cast<Lane>(upper[0]);
+  const auto u1 = reinterpret_cast<Lane>(upper[1]);
+  const auto l0 = reinterpret_cast<Lane>(lower[0]);
+  const auto l1 = reinterpret_cast<Lane>(lower[1]);
+  const Lane upper_left = __builtin_shufflevector(u0, u1, 0, 2, 4, 6);
+  const Lane upper_right = __builtin_shufflevector(u0, u1, 1, 3, 5, 7);
+  const Lane lower_left = __builtin_shufflevector(l0, l1, 0, 2, 4, 6);
+  const Lane lower_right = __builtin_shufflevector(l0, l1, 1, 3, 5, 7);
+  const Lane top = upper_left + fx * (upper_right - upper_left);
+  const Lane bottom = lower_left + fx * (lower_right - lower_left);
+  return top + fy * (bottom - top);
+}
+
 /// Values and gradients of an image at four positions [grey levels, grey levels / px].
 struct LaneSample {
   Lane value, gx, gy;
 };
 
-/// `sample_with_gradient` at four positions at once, bit for bit the same. All four must satisfy
-/// its precondition.
-inline LaneSample sample_lanes_with_gradient(const ImageF& image, const float* x, const float* y) {
+/// `sample_with_gradient` at four positions at once, bit for bit the same: pixels by their offset
+/// in the image, and the positions within them. All four must satisfy its precondition.
+inline LaneSample sample_lanes_with_gradient(const ImageF& image, const std::int32_t* offset,
+                                             Lane fx, Lane fy) {
   Lane blended[kLanes];
   Lane vertical[kLanes];
-  Lane fx;
-  const int w = image.width();
+  const std::ptrdiff_t w = image.width();
+  const float* corner = image.data() - 1 - w;
   for (std::size_t i = 0; i < kLanes; ++i) {
-    const int ix = static_cast<int>(x[i]);
-    const int iy = static_cast<int>(y[i]);
-    fx[i] = x[i] - static_cast<float>(ix);
-    const Lane fy = lane_of(y[i] - static_cast<float>(iy));
-    const float* row = image.row(iy) + ix - 1;
-    const Lane r0 = load_lane(row - w);
-    const Lane r1 = load_lane(row);
-    const Lane r2 = load_lane(row + w);
-    const Lane r3 = load_lane(row + 2 * static_cast<std::ptrdiff_t>(w));
-    blended[i] = r1 + fy * (r2 - r1);
+    const Lane f = lane_of(fy[i]);
+    const float* row = corner + offset[i];
+    const Lane r0 = load_lane(row);
+    const Lane r1 = load_lane(row + w);
+    const Lane r2 = load_lane(row + 2 * w);
+    const Lane r3 = load_lane(row + 3 * w);
+    blended[i] = r1 + f * (r2 - r1);
     const Lane upper = r2 - r0;
     const Lane lower = r3 - r1;
-    vertical[i] = upper + fy * (lower - upper);
+    vertical[i] = upper + f * (lower - upper);
   }
   transpose(&blended[0], &blended[1], &blended[2], &blended[3]);
   transpose(&vertical[0], &vertical[1], &vertical[2], &vertical[3]);
@@ -67,6 +128,16 @@ inline LaneSample sample_lanes_with_gradient(const ImageF& image, const float* x
   const Lane right = blended[3] - blended[1];
   return {blended[1] + fx * (blended[2] - blended[1]), half * (left + fx * (right - left)),
           half * (vertical[1] + fx * (vertical[2] - vertical[1]))};
+}
+
+/// The same from positions.
+inline LaneSample sample_lanes_with_gradient(const ImageF& image, Lane x, Lane y) {
+  const LaneMask ix = __builtin_convertvector(x, LaneMask);
+  const LaneMask iy = __builtin_convertvector(y, LaneMask);
+  std::int32_t offset[kLanes];
+  for (std::size_t i = 0; i < kLanes; ++i) offset[i] = iy[i] * image.width() + ix[i];
+  return sample_lanes_with_gradient(image, offset, x - __builtin_convertvector(ix, Lane),
+                                    y - __builtin_convertvector(iy, Lane));
 }
 
 }  // namespace sovo

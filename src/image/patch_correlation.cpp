@@ -3,9 +3,10 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
-#include "sovo/image/interpolation.h"
+#include "sovo/image/lanes.h"
 
 namespace sovo {
 
@@ -17,7 +18,7 @@ using Mat2f = Eigen::Matrix2f;
 constexpr int kHalfAlong = kPatchAlong / 2;
 constexpr int kHalfAcross = kPatchAcross / 2;
 constexpr int kNodeSteps = 4;      ///< Steps between exact projections.
-constexpr int kSegmentSteps = 24;  ///< Steps that share one warp of the base patch.
+constexpr int kSegmentSteps = 24;  ///< Steps that share one warp of the base patch; whole lanes.
 constexpr double kMinSpeed = 1e-6;
 constexpr double kMaxShear = 0.6;       ///< Displacement along the curve a row across [px].
 constexpr double kShearPrior = 2500.0;  ///< Residuals of 5 grey levels against 0.1 px a row.
@@ -33,19 +34,41 @@ bool readable(const ImageF& image, const Vec2f& center, const Vec2f& a, const Ve
   return readable(image, center - reach) && readable(image, center + reach);
 }
 
-/// Samples a grid around `center`, `axes` = (along, across) steps; along is the slow index, as in
-/// a strip. False when it leaves the image.
+/// Steps along and across of each pixel of a grid; along is the slow index. Filled up to whole
+/// lanes with the centre.
+template <int kHalfS, int kHalfT>
+struct Grid {
+  static constexpr std::size_t kSize =
+      static_cast<std::size_t>((2 * kHalfS + 1) * (2 * kHalfT + 1));
+  static constexpr std::size_t kPadded = (kSize + kLanes - 1) / kLanes * kLanes;
+  alignas(16) std::array<float, kPadded> s{}, t{};
+  constexpr Grid() {
+    std::size_t k = 0;
+    for (int i = -kHalfS; i <= kHalfS; ++i) {
+      for (int j = -kHalfT; j <= kHalfT; ++j, ++k) {
+        s[k] = static_cast<float>(i);
+        t[k] = static_cast<float>(j);
+      }
+    }
+  }
+};
+
+/// Samples a grid around `center`, `axes` = (along, across) steps. False when it leaves the image.
 template <int kHalfS, int kHalfT>
 bool sample_grid(const ImageF& image, const Vec2f& center, const Mat2f& axes, float* out) {
+  constexpr Grid<kHalfS, kHalfT> kGrid;
   const Vec2f s = axes.col(0);
   const Vec2f t = axes.col(1);
   if (!readable(image, center, kHalfS * s, kHalfT * t)) return false;
-  for (int i = -kHalfS; i <= kHalfS; ++i) {
-    for (int j = -kHalfT; j <= kHalfT; ++j) {
-      const Vec2f p = center + static_cast<float>(i) * s + static_cast<float>(j) * t;
-      *out++ = sample(image, p.x(), p.y());
-    }
+  alignas(16) std::array<float, kGrid.kPadded> values;
+  for (std::size_t k = 0; k < kGrid.kPadded; k += kLanes) {
+    const Lane i = load_lane(&kGrid.s[k]);
+    const Lane j = load_lane(&kGrid.t[k]);
+    store_lane(
+        sample_lanes(image, center.x() + i * s.x() + j * t.x(), center.y() + i * s.y() + j * t.y()),
+        &values[k]);
   }
+  std::copy_n(values.begin(), kGrid.kSize, out);
   return true;
 }
 
@@ -56,13 +79,11 @@ float sum_of(const float* v) {
 }
 
 float dot(const float* a, const float* b) {
-  float lanes[4] = {0.0F, 0.0F, 0.0F, 0.0F};  // independent sums, so that they can be vectorized
-  int i = 0;
-  for (; i + 4 <= kPatchSize; i += 4) {
-    for (int k = 0; k < 4; ++k) lanes[k] += a[i + k] * b[i + k];
-  }
-  for (; i < kPatchSize; ++i) lanes[0] += a[i] * b[i];
-  return (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
+  Lane sum{};
+  std::size_t i = 0;
+  for (; i + kLanes <= kPatchSize; i += kLanes) sum += load_lane(a + i) * load_lane(b + i);
+  for (; i < kPatchSize; ++i) sum[0] += a[i] * b[i];
+  return sum_lane(sum);
 }
 
 using Patch = std::array<float, kPatchSize>;
@@ -88,31 +109,55 @@ Mat2f axes_of(const Vec2& direction) {
   return axes;
 }
 
-/// Target image along the curve: one column of kPatchAcross pixels a step.
+/// Target image along the curve: one column of kPatchAcross pixels a step, stored by rows, with
+/// whole lanes of unseen columns behind the last.
 struct Strip {
   static constexpr int kColumns = CorrelationProfile::kCapacity + kPatchAlong - 1;
+  static constexpr std::size_t kStride = kColumns + 4 * kLanes;
   int size = 0;
-  std::array<float, kColumns * kPatchAcross> pixels;
-  std::array<float, kColumns> sum, energy, rho;
-  std::array<bool, kColumns> seen;
-  std::array<Vec2f, kColumns> position;
+  std::array<std::array<float, kStride>, kPatchAcross> rows;
+  std::array<float, kStride> sum, energy, rho;
+  std::array<std::int32_t, kStride> seen;  ///< -1 or 0.
 };
+static_assert(kNodeSteps == kLanes);
 
-void append_column(const ImageF& image, const Vec2f& center, const Vec2f& across, float rho,
-                   Strip* strip) {
-  const int k = strip->size++;
-  strip->rho[k] = rho;
-  strip->position[k] = center;
-  strip->seen[k] = readable(image, center, Vec2f::Zero(), kHalfAcross * across);
-  strip->sum[k] = strip->energy[k] = 0.0F;
-  if (!strip->seen[k]) return;
-  float* column = strip->pixels.data() + static_cast<std::ptrdiff_t>(k) * kPatchAcross;
+/// Appends the first `count` of four columns from `from` on, in steps of `step`.
+void append_columns(const ImageF& image, const Vec2f& from, const Vec2f& step, const Vec2f& across,
+                    int count, Strip* strip) {
+  const auto k = static_cast<std::size_t>(strip->size);
+  const Lane index = {0.0F, 1.0F, 2.0F, 3.0F};
+  const Lane x = from.x() + index * step.x();
+  const Lane y = from.y() + index * step.y();
+  const Vec2f reach = kHalfAcross * across.cwiseAbs();
+  const LaneMask seen = (x >= reach.x()) & (y >= reach.y()) &
+                        (x < static_cast<float>(image.width() - 1) - reach.x()) &
+                        (y < static_cast<float>(image.height() - 1) - reach.y());
+  const Lane zero = lane_of(0.0F);
+  Lane sum = zero;
+  Lane energy = zero;
   for (int j = 0; j < kPatchAcross; ++j) {
-    const Vec2f p = center + static_cast<float>(j - kHalfAcross) * across;
-    column[j] = sample(image, p.x(), p.y());
-    strip->sum[k] += column[j];
-    strip->energy[k] += column[j] * column[j];
+    const auto offset = static_cast<float>(j - kHalfAcross);
+    // A pixel that can be read, where the column is not seen.
+    const Lane value = sample_lanes(image, seen ? x + offset * across.x() : zero,
+                                    seen ? y + offset * across.y() : zero);
+    store_lane(value, &strip->rows[static_cast<std::size_t>(j)][k]);
+    sum += value;
+    energy += value * value;
   }
+  store_lane(sum, &strip->sum[k]);
+  store_lane(energy, &strip->energy[k]);
+  __builtin_memcpy(&strip->seen[k], &seen, sizeof(seen));
+  strip->size += count;
+}
+
+/// Columns that are read with the last ones, but are none.
+void pad(Strip* strip) {
+  const auto k = static_cast<std::size_t>(strip->size);
+  constexpr std::size_t kPadding = 2 * kLanes + kPatchAlong;
+  for (auto& row : strip->rows) std::fill_n(&row[k], kPadding, 0.0F);
+  std::fill_n(&strip->sum[k], kPadding, 0.0F);
+  std::fill_n(&strip->energy[k], kPadding, 0.0F);
+  std::fill_n(&strip->seen[k], kPadding, 0);
 }
 
 /// Samples the target from half a patch before rho_min to half a patch after rho_max; ends early
@@ -128,7 +173,7 @@ void sample_strip(const PatchSearch& search, int level, double rho_min, double r
   node = search.curve.at(rho);
   bool entered = false;
   int after = 0;  // columns past rho_max
-  while (node && after < kHalfAlong) {
+  while (node && after < kHalfAlong && strip->size < Strip::kColumns) {
     const double speed = node->derivative.norm() * scale;
     if (speed < kMinSpeed) return;
     const double d_rho = kNodeSteps / speed;
@@ -137,14 +182,15 @@ void sample_strip(const PatchSearch& search, int level, double rho_min, double r
     const Vec2f from = to_level(node->pixel, level).cast<float>();
     const Vec2f step = (to_level(next->pixel, level).cast<float>() - from) / kNodeSteps;
     const Vec2f across(-step.y() / step.norm(), step.x() / step.norm());
-    for (int j = 0; j < kNodeSteps && after < kHalfAlong; ++j) {
-      if (strip->size == Strip::kColumns) return;
-      const double at = rho + d_rho * j / kNodeSteps;
-      append_column(image, from + static_cast<float>(j) * step, across, static_cast<float>(at),
-                    strip);
+    int count = 0;
+    for (; count < kNodeSteps && after < kHalfAlong; ++count) {
+      if (strip->size + count == Strip::kColumns) break;
+      const double at = rho + d_rho * count / kNodeSteps;
+      strip->rho[static_cast<std::size_t>(strip->size + count)] = static_cast<float>(at);
       if (at > rho_max) ++after;
     }
-    const bool inside = strip->seen[strip->size - 1];
+    append_columns(image, from, step, across, count, strip);
+    const bool inside = strip->seen[static_cast<std::size_t>(strip->size - 1)] != 0;
     if (entered && !inside) return;
     entered = entered || inside;
     rho += d_rho;
@@ -168,19 +214,28 @@ bool base_patch(const PatchSearch& search, int level, double rho, Patch* patch) 
   return true;
 }
 
-float window_score(const Strip& strip, int first, const Patch& patch) {
-  float sum = 0.0F;
-  float energy = 0.0F;
-  for (int k = first; k < first + kPatchAlong; ++k) {
-    if (!strip.seen[k]) return CorrelationProfile::kUnseen;
-    sum += strip.sum[k];
-    energy += strip.energy[k];
+/// Correlation of the patch with the four windows that begin at column `first` and after it.
+Lane window_scores(const Strip& strip, std::size_t first, const Patch& patch) {
+  Lane sum{};
+  Lane energy{};
+  LaneMask seen = {-1, -1, -1, -1};
+  std::array<Lane, kPatchAcross> products{};
+  for (std::size_t i = 0; i < kPatchAlong; ++i) {
+    sum += load_lane(&strip.sum[first + i]);
+    energy += load_lane(&strip.energy[first + i]);
+    LaneMask column;
+    __builtin_memcpy(&column, &strip.seen[first + i], sizeof(column));
+    seen &= column;
+    for (std::size_t j = 0; j < kPatchAcross; ++j) {
+      products[j] += patch[i * kPatchAcross + j] * load_lane(&strip.rows[j][first + i]);
+    }
   }
-  const float variance = energy - sum * sum / kPatchSize;
-  if (variance < 1e-2F * kPatchSize) return 0.0F;
-  return dot(patch.data(),
-             strip.pixels.data() + static_cast<std::ptrdiff_t>(first) * kPatchAcross) /
-         std::sqrt(variance);
+  Lane product = products[0];
+  for (std::size_t j = 1; j < kPatchAcross; ++j) product += products[j];
+  const Lane variance = energy - sum * sum / static_cast<float>(kPatchSize);
+  const Lane zero = lane_of(0.0F);
+  const Lane score = variance < 1e-2F * kPatchSize ? zero : product / sqrt_lane(variance);
+  return seen ? score : lane_of(CorrelationProfile::kUnseen);
 }
 
 }  // namespace
@@ -216,7 +271,9 @@ bool correlate(const PatchSearch& search, int level, double rho_min, double rho_
                CorrelationProfile* profile) {
   Strip strip;
   sample_strip(search, level, rho_min, rho_max, &strip);
+  pad(&strip);
   profile->size = std::max(0, strip.size - (kPatchAlong - 1));
+  std::copy_n(strip.rho.begin() + kHalfAlong, profile->size, profile->rho.begin());
   Patch patch{};
   bool fits = false;
   for (int begin = 0; begin < profile->size; begin += kSegmentSteps) {
@@ -224,10 +281,14 @@ bool correlate(const PatchSearch& search, int level, double rho_min, double rho_
     const int middle = (begin + end) / 2 + kHalfAlong;
     const bool usable = base_patch(search, level, static_cast<double>(strip.rho[middle]), &patch);
     fits = fits || usable;
-    for (int i = begin; i < end; ++i) {
-      profile->rho[i] = strip.rho[i + kHalfAlong];
-      profile->position[i] = strip.position[i + kHalfAlong];
-      profile->score[i] = usable ? window_score(strip, i, patch) : CorrelationProfile::kUnseen;
+    float* score = profile->score.data() + begin;
+    if (!usable) {
+      std::fill(score, score + (end - begin), CorrelationProfile::kUnseen);
+      continue;
+    }
+    for (int i = begin; i < end; i += static_cast<int>(kLanes)) {
+      store_lane(window_scores(strip, static_cast<std::size_t>(i), patch),
+                 profile->score.data() + i);
     }
   }
   return fits;

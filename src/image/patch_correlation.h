@@ -28,9 +28,8 @@ struct CorrelationProfile {
   static constexpr float kUnseen = -2.0F;  ///< Score where the patch leaves an image.
 
   int size = 0;
-  std::array<float, kCapacity> score;
-  std::array<float, kCapacity> rho;                 ///< Inverse depth of each step.
-  std::array<Eigen::Vector2f, kCapacity> position;  ///< In the target, pixels of the level.
+  std::array<float, kCapacity + 4> score;  ///< Written four at a time.
+  std::array<float, kCapacity> rho;        ///< Inverse depth of each step.
 
   float step_rho(int i) const {
     return i + 1 < size ? rho[i + 1] - rho[i] : (i > 0 ? rho[i] - rho[i - 1] : 0.0F);

@@ -355,7 +355,8 @@ void MapSegment::revise(const SE3& T_odom_left, KeyframeOutput* keyframe) const 
   for (float& sigma : keyframe->sigma) sigma *= scale;
 }
 
-void MapSegment::revise_left(std::vector<KeyframeState> left, std::vector<KeyframeOutput>* out) {
+void MapSegment::revise_left(const std::vector<KeyframeState>& left,
+                             std::vector<KeyframeOutput>* out) {
   for (const KeyframeState& state : left) waiting_.push_back(own_points(state));
   if (config_.mode == OdometryMode::kScale && !metric()) {
     if (waiting_.size() > kMostWaiting) {

@@ -91,7 +91,7 @@ class MapSegment {
   KeyframeOutput new_keyframe() const;
   KeyframeOutput own_points(const KeyframeState& state) const;
   void revise(const SE3& T_odom_left, KeyframeOutput* keyframe) const;
-  void revise_left(std::vector<KeyframeState> left, std::vector<KeyframeOutput>* out);
+  void revise_left(const std::vector<KeyframeState>& left, std::vector<KeyframeOutput>* out);
   void publish_scale(const ScaleRecord* record, bool accepted);
 
   const StereoOdometryConfig& config_;

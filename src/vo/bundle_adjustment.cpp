@@ -4,8 +4,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-
-#include "sovo/vo/linearization.h"
+#include <utility>
+#include <vector>
 
 namespace sovo {
 
@@ -33,16 +33,22 @@ MatX orthonormalized(MatX n) {
          values.tail(rank).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
-void backup(Window* window, const std::vector<PointRef>& points) {
-  for (int i = 0; i < window->size(); ++i) (*window)[i].x_backup = (*window)[i].x;
-  for (const PointRef& ref : points) ref.point->rho_backup = ref.point->rho;
-}
+/// An estimate to come back to.
+struct Backup {
+  std::vector<Vec8> x;
+  std::vector<double> rho;
 
-void restore(Window* window, const std::vector<PointRef>& points) {
-  for (int i = 0; i < window->size(); ++i) (*window)[i].set_x((*window)[i].x_backup);
-  for (const PointRef& ref : points) ref.point->rho = ref.point->rho_backup;
-  window->update_geometry();
-}
+  Backup(const Window& window, const std::vector<PointRef>& points) {
+    for (int i = 0; i < window.size(); ++i) x.push_back(window[i].x);
+    rho.reserve(points.size());
+    for (const PointRef& ref : points) rho.push_back(ref.point->rho);
+  }
+  void restore(Window* window, const std::vector<PointRef>& points) const {
+    for (int i = 0; i < window->size(); ++i) (*window)[i].set_x(x[static_cast<std::size_t>(i)]);
+    for (std::size_t i = 0; i < points.size(); ++i) points[i].point->rho = rho[i];
+    window->update_geometry();
+  }
+};
 
 }  // namespace
 
@@ -60,27 +66,6 @@ FramePrior frame_prior(const Keyframe& k, const WindowConfig& config) {
   return prior;
 }
 
-double BundleAdjuster::linearize_all(Window* window, std::vector<PointRef>* points) {
-  const int total = static_cast<int>(points->size());
-  const int num_blocks = (total + kPointBlock - 1) / kPointBlock;
-  std::vector<double> energy(static_cast<std::size_t>(num_blocks), 0.0);
-  pool_->run(num_blocks, [&](int i) {
-    double sum = 0.0;
-    for (int k = i * kPointBlock; k < std::min(total, (i + 1) * kPointBlock); ++k) {
-      const PointRef& ref = (*points)[static_cast<std::size_t>(k)];
-      for (int t = 0; t < window->size(); ++t) {
-        Residual& r = ref.point->residuals[static_cast<std::size_t>((*window)[t].slot)];
-        if (r.state == ResidualState::kAbsent) continue;
-        sum += linearize(*window, config_, ref.host, t, *ref.point, &r);
-      }
-    }
-    energy[static_cast<std::size_t>(i)] = sum;
-  });
-  double total_energy = 0.0;
-  for (const double e : energy) total_energy += e;
-  return total_energy;
-}
-
 double BundleAdjuster::prior_energy(const Window& window) const {
   const VecX x = window.stacked_x();
   double energy = x.dot(window.prior().H * x) + 2.0 * window.prior().b.dot(x);
@@ -91,25 +76,13 @@ double BundleAdjuster::prior_energy(const Window& window) const {
   return energy;
 }
 
-void BundleAdjuster::accept_states(const std::vector<PointRef>& points, Window* window) const {
-  for (const PointRef& ref : points) {
-    for (int t = 0; t < window->size(); ++t) {
-      Residual& r = ref.point->residuals[static_cast<std::size_t>((*window)[t].slot)];
-      if (r.state == ResidualState::kAbsent || r.state == ResidualState::kOutOfView) continue;
-      r.state = r.new_state;
-      r.energy = r.new_energy;
-    }
-  }
-}
-
-void BundleAdjuster::update_outlier_threshold(Window* window,
-                                              const std::vector<PointRef>& points) const {
+void BundleAdjuster::update_outlier_threshold(const WindowLinearization& linearized,
+                                              Window* window) const {
   std::vector<float> energies;
-  energies.reserve(points.size());
-  const auto slot = static_cast<std::size_t>(window->newest().slot);
-  for (const PointRef& ref : points) {
-    const Residual& r = ref.point->residuals[slot];
-    if (r.state != ResidualState::kAbsent && r.new_state != ResidualState::kOutOfView) {
+  energies.reserve(linearized.depths.size());
+  const int newest = window->size() - 1;
+  for (const StoredResidual& r : linearized.residuals) {
+    if (r.target == newest && r.state != ResidualState::kOutOfView) {
       energies.push_back(r.raw_energy);
     }
   }
@@ -123,18 +96,6 @@ void BundleAdjuster::update_outlier_threshold(Window* window,
   std::nth_element(energies.begin(), nth, energies.end());
   const double e = 13.0 + 0.75 * std::sqrt(static_cast<double>(*nth));
   threshold = e * e;
-}
-
-double BundleAdjuster::classify(Window* window, const std::vector<PointRef>& points) const {
-  double energy = 0.0;
-  for (const PointRef& ref : points) {
-    for (int t = 0; t < window->size(); ++t) {
-      Residual& r = ref.point->residuals[static_cast<std::size_t>((*window)[t].slot)];
-      if (r.state == ResidualState::kAbsent) continue;
-      energy += sovo::classify((*window)[ref.host], (*window)[t], &r);
-    }
-  }
-  return energy;
 }
 
 VecX BundleAdjuster::state_units(const Window& window) {
@@ -192,36 +153,10 @@ VecX BundleAdjuster::solve(const Window& window, const NormalEquations& system, 
   return units.cwiseProduct(y);
 }
 
-bool BundleAdjuster::apply_step(Window* window, const std::vector<PointRef>& points, const VecX& dx,
-                                double lambda) const {
+bool BundleAdjuster::apply_step(const WindowLinearization& at, const VecX& dx, double lambda,
+                                PhotometricProblem* problem, Window* window) const {
+  problem->step_depths(at, dx, lambda);
   const int n = window->size();
-  const int total = static_cast<int>(points.size());
-  const int num_blocks = (total + kPointBlock - 1) / kPointBlock;
-  // Relative displacement of each pair: J_x dx of a residual is J_relative times it.
-  std::array<Vec8, static_cast<std::size_t>(kMaxSlots) * kMaxSlots> relative;
-  for (int h = 0; h < n; ++h) {
-    for (int t = 0; t < n; ++t) {
-      if (h == t) continue;
-      relative[static_cast<std::size_t>(h * kMaxSlots + t)] =
-          dx.segment<8>(8 * t) + window->pair(h, t).adjoint_host * dx.segment<8>(8 * h);
-    }
-  }
-  pool_->run(num_blocks, [&](int i) {
-    for (int k = i * kPointBlock; k < std::min(total, (i + 1) * kPointBlock); ++k) {
-      const PointRef& ref = points[static_cast<std::size_t>(k)];
-      Point& p = *ref.point;
-      if (p.hessian <= 1e-10) continue;
-      double b = p.gradient;
-      for (int t = 0; t < n; ++t) {
-        const Residual& r = p.residuals[static_cast<std::size_t>((*window)[t].slot)];
-        if (r.state != ResidualState::kIn) continue;
-        b += Eigen::Map<const Eigen::Matrix<float, 8, 1>>(r.cross.data())
-                 .cast<double>()
-                 .dot(relative[static_cast<std::size_t>(ref.host * kMaxSlots + t)]);
-      }
-      p.rho -= b / (p.hessian * (1.0 + lambda));
-    }
-  });
   Vec4 sums = Vec4::Zero();  // squared: a, b, rotation, translation
   for (int i = 0; i < n; ++i) {
     const Vec8 d = dx.segment<8>(8 * i);
@@ -258,56 +193,63 @@ void BundleAdjuster::drop_bad_residuals(Window* window) const {
   }
 }
 
-BundleResult BundleAdjuster::optimize(Window* window) {
-  BundleResult result;
-  std::vector<PointRef> points = collect_points(window);
-  window->update_geometry();
-  linearize_all(window, &points);
-  update_outlier_threshold(window, points);
-  double energy = classify(window, points) + prior_energy(*window);
-  accept_states(points, window);
-
+void BundleAdjuster::iterate(PhotometricProblem* problem, Window* window, WindowLinearization* now,
+                             BundleResult* result) const {
+  WindowLinearization next;
+  double energy = now->energy + prior_energy(*window);
   double lambda = config_.damping;
   const int max_iterations = window->size() < 4 ? 15 : config_.max_iterations;
   for (int i = 0; i < max_iterations; ++i) {
-    const NormalEquations system = accumulate(*window, points, pool_);
-    backup(window, points);
-    const VecX dx = solve(*window, system, lambda, i >= 2);
+    const VecX dx = solve(*window, now->system, lambda, i >= 2);
     if (!dx.allFinite()) {
-      result.finite = false;
-      restore(window, points);
-      return result;
+      result->finite = false;
+      return;
     }
-    const bool small = apply_step(window, points, dx, lambda);
-    ++result.iterations;
-    const double new_energy = linearize_all(window, &points) + prior_energy(*window);
+    const Backup backup(*window, problem->points());
+    const bool small = apply_step(*now, dx, lambda, problem, window);
+    ++result->iterations;
+    const bool last = (small && i + 1 >= config_.min_iterations) || i + 1 == max_iterations;
+    problem->linearize(*now, {.system = !last}, &next);
+    const double new_energy = next.energy + prior_energy(*window);
     if (new_energy < energy) {
       energy = new_energy;
-      accept_states(points, window);
+      std::swap(*now, next);
       lambda = std::max(config_.damping, lambda * 0.25);
     } else {
-      restore(window, points);
-      linearize_all(window, &points);
+      backup.restore(window, problem->points());
       lambda *= 100.0;
     }
-    if (small && i + 1 >= config_.min_iterations) break;
+    if (last) break;
   }
+}
+
+BundleResult BundleAdjuster::optimize(Window* window) {
+  BundleResult result;
+  PhotometricProblem problem(config_, collect_points(window), window, pool_);
+  window->update_geometry();
+  WindowLinearization known = problem.stored();
+  WindowLinearization now = known;
+  const auto newest = static_cast<unsigned>(window->size() - 1);
+  problem.linearize(known, {.system = false, .targets = 1U << newest}, &now);
+  update_outlier_threshold(now, window);
+  problem.linearize(known, {}, &now);
+  iterate(&problem, window, &now, &result);
+  if (!result.finite) return result;
 
   window->newest().freeze();
   window->update_geometry();
-  update_outlier_threshold(window, points);
-  linearize_all(window, &points);
-  accept_states(points, window);
-  const NormalEquations last = accumulate(*window, points, pool_);  // fresh depth information
-  result.residuals = last.residuals;
-  result.points = static_cast<int>(points.size());
-  double residual_energy = 0.0;
-  for (const PointRef& ref : points) {
-    for (const Residual& r : ref.point->residuals) {
-      if (r.state == ResidualState::kIn) residual_energy += r.energy;
-    }
+  update_outlier_threshold(now, window);
+  std::swap(known, now);
+  problem.linearize(known, {.system = false}, &now);  // fresh depth information
+  problem.write_back(now);
+  double energy = 0.0;
+  for (const StoredResidual& r : now.residuals) {
+    if (r.state != ResidualState::kIn) continue;
+    energy += static_cast<double>(r.energy);
+    ++result.residuals;
   }
-  result.rmse = std::sqrt(residual_energy / std::max(1, kPatternSize * result.residuals));
+  result.points = static_cast<int>(problem.points().size());
+  result.rmse = std::sqrt(energy / std::max(1, kPatternSize * result.residuals));
   result.finite = std::isfinite(result.rmse);
   drop_bad_residuals(window);
   return result;

@@ -2,6 +2,7 @@
 
 #include "sovo/vo/direct_config.h"
 #include "sovo/vo/normal_equations.h"
+#include "sovo/vo/photometric_problem.h"
 #include "sovo/vo/window.h"
 #include "sovo/vo/worker_pool.h"
 
@@ -34,9 +35,6 @@ class BundleAdjuster {
   /// residuals that are outliers or out of view.
   BundleResult optimize(Window* window);
 
-  /// Energy of all residuals at the current estimate, linearizing them (states unchanged).
-  double linearize_all(Window* window, std::vector<PointRef>* points);
-
   /// Energy of the marginalization prior and the frame priors.
   double prior_energy(const Window& window) const;
 
@@ -58,13 +56,14 @@ class BundleAdjuster {
   static VecX state_units(const Window& window);
 
  private:
-  void accept_states(const std::vector<PointRef>& points, Window* window) const;
-  /// Decides all residuals anew for changed thresholds. Returns their energy.
-  double classify(Window* window, const std::vector<PointRef>& points) const;
-  void update_outlier_threshold(Window* window, const std::vector<PointRef>& points) const;
+  /// Sets the newest keyframe's outlier threshold from the energies of the residuals into it.
+  void update_outlier_threshold(const WindowLinearization& linearized, Window* window) const;
   /// Applies the step to poses and, by back-substitution, to depths. True when all are small.
-  bool apply_step(Window* window, const std::vector<PointRef>& points, const VecX& dx,
-                  double lambda) const;
+  bool apply_step(const WindowLinearization& at, const VecX& dx, double lambda,
+                  PhotometricProblem* problem, Window* window) const;
+  /// Levenberg-Marquardt iterations from `now`, which follows the accepted estimate.
+  void iterate(PhotometricProblem* problem, Window* window, WindowLinearization* now,
+               BundleResult* result) const;
   void drop_bad_residuals(Window* window) const;
 
   WindowConfig config_;

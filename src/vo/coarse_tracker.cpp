@@ -6,9 +6,6 @@
 #include <cmath>
 #include <utility>
 
-#include "sovo/image/interpolation.h"
-#include "sovo/image/lanes.h"
-
 namespace sovo {
 
 namespace {
@@ -71,69 +68,115 @@ void CoarseTracker::Warped::reserve(std::size_t size) {
   }
 }
 
-void CoarseTracker::Warped::finish(std::size_t size) {
-  n = size;
-  for (auto* v : {&x, &y, &rho, &gx, &gy, &residual, &weight, &colour}) {
-    std::fill_n(v->begin() + static_cast<std::ptrdiff_t>(n), kLanes, 0.0F);
+CoarseTracker::Warp::Warp(const CameraModel& camera, const SE3& T)
+    : RKi((T.rotation_matrix() * camera.matrix().inverse()).cast<float>()),
+      t(T.translation().cast<float>()),
+      fx(static_cast<float>(camera.fx)),
+      fy(static_cast<float>(camera.fy)),
+      cx(static_cast<float>(camera.cx)),
+      cy(static_cast<float>(camera.cy)) {}
+
+CoarseTracker::Projected CoarseTracker::project(const ReferenceLevel& level, std::size_t i,
+                                                const ImageF& image, const Warp& warp) {
+  // The last points may not fill a lane.
+  const std::size_t left = std::min(kLanes, level.size() - i);
+  const auto load = [&](const AlignedVector<float>& v) {
+    if (left == kLanes) return load_lane(&v[i]);
+    std::array<float, kLanes> padded{};
+    std::copy_n(v.begin() + static_cast<std::ptrdiff_t>(i), left, padded.begin());
+    return load_lane(padded.data());
+  };
+  Projected out;
+  const Lane u = load(level.u);
+  const Lane v = load(level.v);
+  const Lane rho = load(level.rho);
+  out.colour = load(level.colour);
+  const auto& m = warp.RKi;
+  const Lane px = m(0, 0) * u + m(0, 1) * v + m(0, 2) + warp.t.x() * rho;
+  const Lane py = m(1, 0) * u + m(1, 1) * v + m(1, 2) + warp.t.y() * rho;
+  const Lane pz = m(2, 0) * u + m(2, 1) * v + m(2, 2) + warp.t.z() * rho;
+  const Lane iz = 1.0F / pz;
+  out.x = px * iz;
+  out.y = py * iz;
+  out.rho = rho * iz;
+  const Lane ku = warp.fx * out.x + warp.cx;
+  const Lane kv = warp.fy * out.y + warp.cy;
+  // Written so that NaN counts as outside.
+  const LaneMask index = {0, 1, 2, 3};
+  out.in_view = (pz > 0.0F) & (ku >= 2.0F) & (kv >= 2.0F) &
+                (ku < static_cast<float>(image.width() - 3)) &
+                (kv < static_cast<float>(image.height() - 3)) & (index < static_cast<int>(left));
+  // Outside, a pixel that can be read.
+  const Lane one = lane_of(1.0F);
+  const Lane su = out.in_view ? ku : one;
+  const Lane sv = out.in_view ? kv : one;
+  const LaneMask iu = __builtin_convertvector(su, LaneMask);
+  const LaneMask iv = __builtin_convertvector(sv, LaneMask);
+  out.fx = su - __builtin_convertvector(iu, Lane);
+  out.fy = sv - __builtin_convertvector(iv, Lane);
+  for (std::size_t k = 0; k < kLanes; ++k) {
+    out.offset[k] = iv[k] * image.width() + iu[k];
+    const float* pixel = image.data() + out.offset[k];
+    for (std::ptrdiff_t row = -1; row <= 2; ++row) {
+      __builtin_prefetch(pixel + row * image.width());
+    }
   }
+  return out;
 }
 
 double CoarseTracker::residuals(const ReferenceLevel& level, const ImageF& image, const SE3& T,
                                 const BrightnessTransfer& transfer, double cutoff,
                                 Linearization* out) {
-  const Eigen::Matrix3f RKi = (T.rotation_matrix() * level.camera.matrix().inverse()).cast<float>();
-  const Eigen::Vector3f t = T.translation().cast<float>();
-  const auto fx = static_cast<float>(level.camera.fx);
-  const auto fy = static_cast<float>(level.camera.fy);
-  const auto cx = static_cast<float>(level.camera.cx);
-  const auto cy = static_cast<float>(level.camera.cy);
+  const Warp warp(level.camera, T);
   const auto gain = static_cast<float>(transfer.gain);
   const auto bias = static_cast<float>(transfer.bias);
-  const auto huber = static_cast<float>(config_.huber);
-  const auto limit = static_cast<float>(cutoff);
-  const float max_energy = 2.0F * huber * limit - huber * huber;
+  const Lane huber = lane_of(static_cast<float>(config_.huber));
+  const Lane limit = lane_of(static_cast<float>(cutoff));
+  const Lane max_energy = 2.0F * huber * limit - huber * huber;
+  const Lane zero = lane_of(0.0F);
+  const Lane one = lane_of(1.0F);
   warped_.reserve(level.size() + kLanes);
   std::size_t n = 0;
-  int in_view = 0;
-  double energy = 0.0;
-  for (std::size_t i = 0; i < level.size(); ++i) {
-    const float u = level.u[i];
-    const float v = level.v[i];
-    const float rho = level.rho[i];
-    const float px = RKi(0, 0) * u + RKi(0, 1) * v + RKi(0, 2) + t.x() * rho;
-    const float py = RKi(1, 0) * u + RKi(1, 1) * v + RKi(1, 2) + t.y() * rho;
-    const float pz = RKi(2, 0) * u + RKi(2, 1) * v + RKi(2, 2) + t.z() * rho;
-    const float iz = 1.0F / pz;
-    const float x = px * iz;
-    const float y = py * iz;
-    const float ku = fx * x + cx;
-    const float kv = fy * y + cy;
-    if (!(pz > 0.0F) || !in_image(image, ku, kv, 1.0F)) continue;
-    const Sample s = sample_with_gradient(image, ku, kv);
-    const float r = s.value - (gain * level.colour[i] + bias);
-    const float magnitude = std::abs(r);
-    ++in_view;
-    if (!(magnitude <= limit)) {
-      energy += max_energy;
-      continue;
+  LaneMask in_view{};
+  LaneMask inliers{};
+  using Energies = double __attribute__((vector_size(4 * sizeof(double))));
+  Energies energies{};
+  std::array<Projected, kAhead> projected;
+  for (std::size_t begin = 0; begin < level.size(); begin += kAhead * kLanes) {
+    const std::size_t end = std::min(level.size(), begin + kAhead * kLanes);
+    for (std::size_t i = begin; i < end; i += kLanes) {
+      projected[(i - begin) / kLanes] = project(level, i, image, warp);
     }
-    const float hw = magnitude < huber ? 1.0F : huber / magnitude;
-    energy += hw * r * r * (2.0F - hw);
-    warped_.x[n] = x;
-    warped_.y[n] = y;
-    warped_.rho[n] = rho * iz;
-    warped_.gx[n] = s.gx * fx;
-    warped_.gy[n] = s.gy * fy;
-    warped_.residual[n] = r;
-    warped_.weight[n] = hw;
-    warped_.colour[n] = level.colour[i];
-    ++n;
+    for (std::size_t i = begin; i < end; i += kLanes) {
+      const Projected& p = projected[(i - begin) / kLanes];
+      const LaneSample s = sample_lanes_with_gradient(image, p.offset.data(), p.fx, p.fy);
+      const Lane r = s.value - (gain * p.colour + bias);
+      const Lane magnitude = abs_lane(r);
+      const LaneMask inlier = p.in_view & (magnitude <= limit);
+      const Lane hw = min_lane(one, huber / magnitude);
+      const Lane energy = inlier ? hw * r * r * (2.0F - hw) : max_energy;
+      energies += __builtin_convertvector(p.in_view ? energy : zero, Energies);
+      in_view -= p.in_view;
+      inliers -= inlier;
+      if (none_of(inlier)) continue;
+      // Outliers stay among them with weight and values zero.
+      store_lane(inlier ? p.x : zero, &warped_.x[n]);
+      store_lane(inlier ? p.y : zero, &warped_.y[n]);
+      store_lane(inlier ? p.rho : zero, &warped_.rho[n]);
+      store_lane(inlier ? s.gx * warp.fx : zero, &warped_.gx[n]);
+      store_lane(inlier ? s.gy * warp.fy : zero, &warped_.gy[n]);
+      store_lane(inlier ? r : zero, &warped_.residual[n]);
+      store_lane(inlier ? hw : zero, &warped_.weight[n]);
+      store_lane(p.colour, &warped_.colour[n]);
+      n += kLanes;
+    }
   }
-  warped_.finish(n);
-  out->in_view = in_view;
-  out->inliers = static_cast<int>(n);
-  out->saturated = in_view > 0 ? 1.0 - static_cast<double>(n) / in_view : 1.0;
-  out->energy = in_view > 0 ? energy / in_view : 1e10;
+  warped_.n = n;
+  out->in_view = in_view[0] + in_view[1] + in_view[2] + in_view[3];
+  out->inliers = inliers[0] + inliers[1] + inliers[2] + inliers[3];
+  out->saturated = out->in_view > 0 ? 1.0 - static_cast<double>(out->inliers) / out->in_view : 1.0;
+  const double energy = (energies[0] + energies[1]) + (energies[2] + energies[3]);
+  out->energy = out->in_view > 0 ? energy / out->in_view : 1e10;
   return out->energy;
 }
 

@@ -1,8 +1,11 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
+#include "sovo/image/lanes.h"
 #include "sovo/vo/direct_config.h"
 #include "sovo/vo/tracking_reference.h"
 
@@ -73,13 +76,31 @@ class CoarseTracker {
 
   TrackerConfig config_;
 
-  /// The inliers of the newest residual pass.
+  /// Motion and camera of a level, as the residuals want them.
+  struct Warp {
+    Warp(const CameraModel& camera, const SE3& T);
+    Eigen::Matrix3f RKi;
+    Eigen::Vector3f t;
+    float fx, fy, cx, cy;
+  };
+  /// Four reference points in the current frame.
+  struct Projected {
+    Lane x, y, rho;                           ///< In the normalized image; inverse depth.
+    Lane colour;                              ///< In the reference.
+    Lane fx, fy;                              ///< Position within its pixel.
+    std::array<std::int32_t, kLanes> offset;  ///< Of that pixel in the image.
+    LaneMask in_view;
+  };
+  /// Groups of points that are projected, and their images asked for, before the first is sampled.
+  static constexpr std::size_t kAhead = 8;
+  static Projected project(const ReferenceLevel& level, std::size_t i, const ImageF& image,
+                           const Warp& warp);
+
+  /// The inliers of the newest residual pass, whole lanes.
   struct Warped {
     AlignedVector<float> x, y, rho, gx, gy, residual, weight, colour;
     std::size_t n = 0;
     void reserve(std::size_t size);
-    /// Sets the number of inliers and clears one lane behind them: whole lanes are summed.
-    void finish(std::size_t size);
   };
   Warped warped_;
 };

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "sovo/image/interpolation.h"
+#include "sovo/image/lanes.h"
 
 namespace sovo {
 
@@ -77,31 +78,49 @@ TraceState find_segment(const ImageF& image, const HostGeometry& g, const PointC
   return TraceState::kUntraced;
 }
 
-bool fits_border(const WarpedPattern& pattern) {
-  return std::all_of(pattern.begin(), pattern.end(), [](const PatternOffset& o) {
-    return std::abs(o.x) < kMaxPatternOffset && std::abs(o.y) < kMaxPatternOffset;
-  });
+bool fits_border(const SearchPattern& pattern) {
+  const Lane limit = lane_of(kMaxPatternOffset);
+  return all_of((abs_lane(pattern.x[0]) < limit) & (abs_lane(pattern.x[1]) < limit) &
+                (abs_lane(pattern.y[0]) < limit) & (abs_lane(pattern.y[1]) < limit));
 }
 
 /// Huber energy of the pattern at (u, v).
-float pattern_energy(const ImageF& image, const WarpedPattern& pattern, const HostGeometry& g,
-                     const ImmaturePoint& p, float huber, float u, float v) {
-  float energy = 0.0F;
-  for (std::size_t i = 0; i < kPatternSize; ++i) {
-    const float x = u + pattern[i].x;
-    const float y = v + pattern[i].y;
-    const float r = sample(image, x, y) - (g.gain * p.colour[i] + g.bias);
-    const float magnitude = std::abs(r);
-    const float hw = magnitude < huber ? 1.0F : huber / magnitude;
+float pattern_energy(const ImageF& image, const SearchPattern& pattern, float huber, float u,
+                     float v) {
+  Lane energy{};
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Lane r = sample_lanes(image, u + pattern.x[k], v + pattern.y[k]) - pattern.colour[k];
+    const Lane hw = min_lane(lane_of(1.0F), huber / abs_lane(r));
     energy += hw * r * r * (2.0F - hw);
   }
-  return energy;
+  return sum_lane(energy);
+}
+
+/// Normal equation of a displacement along the line, and the weighted energy.
+struct LineStep {
+  float H = 1.0F, b = 0.0F, energy = 0.0F;
+};
+
+LineStep linearize_line(const ImageF& image, const SearchPattern& pattern, float huber, float dx,
+                        float dy, float u, float v) {
+  Lane H{};
+  Lane b{};
+  Lane energy{};
+  const LineResiduals line = line_residuals(image, pattern, u, v, dx, dy);
+  for (std::size_t k = 0; k < 2; ++k) {
+    const Lane r = line.r[k];
+    const Lane slope = line.slope[k];
+    const Lane hw = min_lane(lane_of(1.0F), huber / abs_lane(r));
+    H += hw * slope * slope;
+    b += hw * r * slope;
+    energy += pattern.squared_weight[k] * hw * r * r * (2.0F - hw);
+  }
+  return {1.0F + sum_lane(H), sum_lane(b), sum_lane(energy)};
 }
 
 /// Gauss-Newton along the line from (*u, *v). Returns the best energy.
-float refine(const ImageF& image, const WarpedPattern& pattern, const HostGeometry& g,
-             const ImmaturePoint& p, float huber, float dx, float dy, float start_energy, float* u,
-             float* v) {
+float refine(const ImageF& image, const SearchPattern& pattern, float huber, float dx, float dy,
+             float start_energy, float* u, float* v) {
   float best = start_energy;
   float best_u = *u;
   float best_v = *v;
@@ -109,30 +128,18 @@ float refine(const ImageF& image, const WarpedPattern& pattern, const HostGeomet
   float factor = 1.0F;
   for (int it = 0; it < kRefinements; ++it) {
     if (!inside(image, *u, *v)) break;
-    float H = 1.0F;
-    float b = 0.0F;
-    float energy = 0.0F;
-    const LineResiduals line = line_residuals(image, g, pattern, p, *u, *v, dx, dy);
-    for (std::size_t i = 0; i < kPatternSize; ++i) {
-      const float r = line.r[i];
-      const float slope = line.slope[i];
-      const float magnitude = std::abs(r);
-      const float hw = magnitude < huber ? 1.0F : huber / magnitude;
-      H += hw * slope * slope;
-      b += hw * r * slope;
-      energy += p.weight[i] * p.weight[i] * hw * r * r * (2.0F - hw);
-    }
+    const LineStep at = linearize_line(image, pattern, huber, dx, dy, *u, *v);
     float step;
-    if (energy > best && it > 0) {
+    if (at.energy > best && it > 0) {
       factor *= 0.5F;
       step = factor * step_back;
       *u = best_u;
       *v = best_v;
     } else {
-      best = energy;
+      best = at.energy;
       best_u = *u;
       best_v = *v;
-      step = std::clamp(-factor * b / H, -kMaxRefinement, kMaxRefinement);
+      step = std::clamp(-factor * at.b / at.H, -kMaxRefinement, kMaxRefinement);
       step_back = step;
     }
     if (!std::isfinite(step)) step = 0.0F;
@@ -183,24 +190,26 @@ HostGeometry host_geometry(const CameraModel& camera, const SE3& T_target_host,
   return g;
 }
 
-WarpedPattern warp_pattern(const HostGeometry& g) {
-  const Eigen::Matrix3f& m = g.KRKi;
-  WarpedPattern out;
+SearchPattern search_pattern(const HostGeometry& g, const ImmaturePoint& p) {
+  SearchPattern out;
   for (std::size_t i = 0; i < kPatternSize; ++i) {
-    out[i] = {m(0, 0) * kPattern[i].x + m(0, 1) * kPattern[i].y,
-              m(1, 0) * kPattern[i].x + m(1, 1) * kPattern[i].y};
+    const std::size_t k = i / kLanes;
+    const std::size_t lane = i % kLanes;
+    out.x[k][lane] = g.KRKi(0, 0) * kPattern[i].x + g.KRKi(0, 1) * kPattern[i].y;
+    out.y[k][lane] = g.KRKi(1, 0) * kPattern[i].x + g.KRKi(1, 1) * kPattern[i].y;
+    out.colour[k][lane] = g.gain * p.colour[i] + g.bias;
+    out.squared_weight[k][lane] = p.weight[i] * p.weight[i];
   }
   return out;
 }
 
-LineResiduals line_residuals(const ImageF& image, const HostGeometry& g,
-                             const WarpedPattern& pattern, const ImmaturePoint& point, float u,
-                             float v, float dx, float dy) {
+LineResiduals line_residuals(const ImageF& image, const SearchPattern& pattern, float u, float v,
+                             float dx, float dy) {
   LineResiduals out;
-  for (std::size_t i = 0; i < kPatternSize; ++i) {
-    const Sample s = sample_with_gradient(image, u + pattern[i].x, v + pattern[i].y);
-    out.r[i] = s.value - (g.gain * point.colour[i] + g.bias);
-    out.slope[i] = dx * s.gx + dy * s.gy;
+  for (std::size_t k = 0; k < 2; ++k) {
+    const LaneSample s = sample_lanes_with_gradient(image, u + pattern.x[k], v + pattern.y[k]);
+    out.r[k] = s.value - pattern.colour[k];
+    out.slope[k] = dx * s.gx + dy * s.gy;
   }
   return out;
 }
@@ -248,7 +257,7 @@ TraceState trace(const ImageF& image, const HostGeometry& g, const PointConfig& 
   error = std::min(error, kMaxPixelError);
 
   const auto huber = static_cast<float>(config.huber);
-  const WarpedPattern pattern = warp_pattern(g);
+  const SearchPattern pattern = search_pattern(g, p);
   if (!fits_border(pattern)) return finish(&p, TraceState::kBadCondition);
   const int steps = std::min(static_cast<int>(1.9999F + s.length), kMaxSteps - 1);
   std::array<float, kMaxSteps> energies;
@@ -259,7 +268,7 @@ TraceState trace(const ImageF& image, const HostGeometry& g, const PointConfig& 
     const float u = s.u_min + t * dx;
     const float v = s.v_min + t * dy;
     float energy = 1e5F;
-    if (inside(image, u, v)) energy = pattern_energy(image, pattern, g, p, huber, u, v);
+    if (inside(image, u, v)) energy = pattern_energy(image, pattern, huber, u, v);
     energies[static_cast<std::size_t>(i)] = energy;
     if (energy < best_energy) {
       best_energy = energy;
@@ -272,7 +281,7 @@ TraceState trace(const ImageF& image, const HostGeometry& g, const PointConfig& 
 
   float u = s.u_min + static_cast<float>(best) * dx;
   float v = s.v_min + static_cast<float>(best) * dy;
-  const float refined = refine(image, pattern, g, p, huber, dx, dy, best_energy, &u, &v);
+  const float refined = refine(image, pattern, huber, dx, dy, best_energy, &u, &v);
   if (!(refined < p.energy_threshold * 1.2F)) {
     const bool twice = p.state == TraceState::kOutlier;
     return finish(&p, twice ? TraceState::kOutOfView : TraceState::kOutlier);

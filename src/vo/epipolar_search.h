@@ -3,6 +3,7 @@
 #include <array>
 
 #include "sovo/geometry/camera_model.h"
+#include "sovo/image/lanes.h"
 #include "sovo/vo/direct_config.h"
 #include "sovo/vo/immature_point.h"
 #include "sovo/vo/pattern.h"
@@ -20,16 +21,21 @@ struct HostGeometry {
 HostGeometry host_geometry(const CameraModel& camera, const SE3& T_target_host,
                            const BrightnessTransfer& transfer);
 
-/// Offsets of the pattern's pixels from its centre in the image that is searched [px].
-using WarpedPattern = std::array<PatternOffset, kPatternSize>;
+/// What a search compares the image with, four of the pattern's pixels a lane.
+struct SearchPattern {
+  /// Offsets from the pattern's centre in the searched image: the pattern as the upper 2x2 of
+  /// K R K^-1 turns and stretches it [px].
+  std::array<Lane, 2> x, y;
+  std::array<Lane, 2> colour;          ///< Grey levels that it should find: gain * colour + bias.
+  std::array<Lane, 2> squared_weight;  ///< Of the pixels [1].
+};
 
-/// The pattern as the upper 2x2 of K R K^-1 turns and stretches it.
-WarpedPattern warp_pattern(const HostGeometry& geometry);
+SearchPattern search_pattern(const HostGeometry& geometry, const ImmaturePoint& point);
 
-/// Photometric residuals of a pattern and their derivatives along a line, one a pattern pixel.
+/// Photometric residuals of a pattern and their derivatives along a line.
 struct LineResiduals {
-  std::array<float, kPatternSize> r;      ///< [grey levels]
-  std::array<float, kPatternSize> slope;  ///< d r / d t [grey levels / px].
+  std::array<Lane, 2> r;      ///< [grey levels]
+  std::array<Lane, 2> slope;  ///< d r / d t [grey levels / px].
 };
 
 /// What Gauss-Newton along the epipolar line needs at (u, v), with the line's unit direction
@@ -37,9 +43,8 @@ struct LineResiduals {
 ///   r_i(t) = I((u, v) + t (dx, dy) + o_i) - (gain * colour_i + bias),
 ///   dr_i/dt = grad I . (dx, dy), both at t = 0.
 /// The pattern must lie in the image, a pixel from its border.
-LineResiduals line_residuals(const ImageF& image, const HostGeometry& geometry,
-                             const WarpedPattern& pattern, const ImmaturePoint& point, float u,
-                             float v, float dx, float dy);
+LineResiduals line_residuals(const ImageF& image, const SearchPattern& pattern, float u, float v,
+                             float dx, float dy);
 
 /// Pattern colours, weights and gradients of a new immature point at pixel (u, v) of `image`.
 /// False when the pattern does not fit into the image or has no finite value.

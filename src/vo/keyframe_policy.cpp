@@ -11,15 +11,16 @@ constexpr double kFlowUnit = 1120.0;  // width + height of a VGA image, where th
 constexpr int kManyGood = 14;         // good residuals on record of a long-seen point
 constexpr int kFewLeft = 3;
 
-/// Sum over the other keyframes of 1 / distance, times the root of the distance to the newest.
-double distance_score(const Window& window, int i) {
+/// Sum over the other keyframes of 1 / distance, times the root of the distance to the newest;
+/// distances in mean depths.
+double distance_score(const Window& window, double mean_rho, int i) {
   double sum = 0.0;
   for (int j = 0; j < window.size() - 1; ++j) {
     if (j == i) continue;
-    const double d = window.pair(i, j).distance * window.mean_inverse_depth();
+    const double d = window.pair(i, j).distance * mean_rho;
     sum += 1.0 / (d + 1e-5);
   }
-  const double to_newest = window.pair(i, window.size() - 1).distance * window.mean_inverse_depth();
+  const double to_newest = window.pair(i, window.size() - 1).distance * mean_rho;
   return std::sqrt(to_newest) * sum;
 }
 
@@ -65,11 +66,12 @@ void mark_leaving_keyframes(const KeyframeConfig& config, Window* window) {
     }
   }
   if (n - leaving < config.max_keyframes) return;
+  const double mean_rho = window->mean_inverse_depth();
   double best = -1.0;
   int best_index = -1;
   for (int i = 0; i < n - 1; ++i) {
     if ((*window)[i].leaving || (*window)[i].id == 0) continue;
-    const double score = distance_score(*window, i);
+    const double score = distance_score(*window, mean_rho, i);
     if (score > best) {
       best = score;
       best_index = i;

@@ -4,7 +4,7 @@
 
 #include "sovo/vo/coarse_tracker.h"
 #include "sovo/vo/direct_config.h"
-#include "sovo/vo/normal_equations.h"
+#include "sovo/vo/photometric_problem.h"
 #include "sovo/vo/window.h"
 
 namespace sovo {

@@ -1,31 +1,67 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
+
 #include "sovo/vo/direct_config.h"
 #include "sovo/vo/window.h"
 
 namespace sovo {
 
-/// Linearizes the residual of `point` (host keyframe index `host`) into keyframe index `target`:
-/// fills everything of `residual` but `state`; its `new_state` and `new_energy` say what it would
-/// become. The image gradient, weights and pixel positions come from the current estimate, the
-/// geometric Jacobian once at the centre pixel from the frozen poses (first estimates).
-/// Returns the new energy.
+/// Photometric residual of a point's pattern in one target keyframe, linearized, in compact form.
+/// With the pattern's Jacobian rows J_i = [g_i^T D, ja_i, jb_i] (image gradient g_i, geometric
+/// Jacobian D at the centre pixel, brightness), all that the normal equations need is the 4x4 Gram
+/// matrix of (gx, gy, ja, jb), its product with r, and D.
+struct LinearizedResidual {
+  std::array<float, 10> gram{};        ///< Upper triangle of sum [gx gy ja jb]^T [gx gy ja jb].
+  std::array<float, 4> gram_r{};       ///< sum [gx gy ja jb]^T r.
+  float rr = 0.0F;                     ///< sum r^2 (weighted).
+  float raw_energy = 0.0F;             ///< As measured, outlier or not.
+  std::array<float, 8> du{}, dv{};     ///< d (u, v) / d (relative state) [px]; no part of a, b.
+  std::array<float, 8> cross{};        ///< J_state^T J_rho of this residual, relative coordinates.
+  float du_rho = 0.0F, dv_rho = 0.0F;  ///< d (u, v) / d (inverse depth) [px m].
+  float energy = 0.0F;                 ///< As it counts: an outlier counts its threshold.
+  float centre_u = 0.0F, centre_v = 0.0F;        ///< Projection of the centre pixel [px].
+  float centre_rho = 0.0F;                       ///< Inverse depth in the target [1/m].
+  ResidualState state = ResidualState::kAbsent;  ///< What the residual would become.
+};
+
+/// Where a point's pattern falls in a target image by the current poses, and the geometric
+/// Jacobian of its centre at the frozen ones.
+struct PatternProjection {
+  alignas(16) std::array<float, kPatternSize> fx, fy;  ///< Position within its pixel.
+  std::array<std::int32_t, kPatternSize> offset;       ///< Of that pixel in the image.
+  float centre_u = 0.0F, centre_v = 0.0F, centre_rho = 0.0F;
+  float x = 0.0F, y = 0.0F;     ///< Centre in the normalized target image, poses frozen.
+  float iz = 0.0F, rho = 0.0F;  ///< z_host / z_target; inverse depth in the host [1/m].
+  bool in_view = false;
+};
+
+/// First half of a linearization. What `linearize_projected` will read can be fetched meanwhile.
+void project_pattern(const Window& window, int host, int target, const Point& point,
+                     PatternProjection* projection);
+
+/// Asks for the image lines of a projection.
+void prefetch_pattern(const Window& window, int target, const PatternProjection& projection);
+
+/// Second half: everything of the linearized residual. The image gradient, weights and pixel
+/// positions come from the current estimate, the geometric Jacobian once at the centre pixel from
+/// the frozen poses (first estimates). `residual` is what is known so far: out of view it stays,
+/// with the energy that it has. Returns the new energy.
+float linearize_projected(const Window& window, const WindowConfig& config, int host, int target,
+                          const Point& point, const Residual& residual,
+                          const PatternProjection& projection, LinearizedResidual* out);
+
+/// Both halves: linearizes the residual of `point` (host keyframe index `host`) into keyframe index
+/// `target`.
 float linearize(const Window& window, const WindowConfig& config, int host, int target,
-                const Point& point, Residual* residual);
-
-/// Decides from a linearized residual's energy and the outlier thresholds of its keyframes whether
-/// it is an inlier; out of view stays so. Returns the new energy.
-float classify(const Keyframe& host, const Keyframe& target, Residual* residual);
-
-/// The 8x8 normal matrix and the gradient of a residual in relative coordinates (pose, a, b of the
-/// target while the host stays), added to H and b.
-void accumulate_relative(const Residual& residual, Mat8* H, Vec8* b);
+                const Point& point, const Residual& residual, LinearizedResidual* out);
 
 /// Adds the part of a residual to a point's own H_rho_rho and b_rho.
-void accumulate_depth(const Residual& residual, double* hessian, double* gradient);
+void accumulate_depth(const LinearizedResidual& residual, double* hessian, double* gradient);
 
-/// r - J x for the displacement `x` (8, relative) and `rho_delta`: changes `gram_r` so that later
-/// accumulation sees the residual as it would be at the linearization point.
-void shift_residual(const Vec8& x, double rho_delta, Residual* residual);
+/// r - J x for the displacement `x` (8, relative): changes `gram_r` so that later accumulation sees
+/// the residual as it would be at the linearization point of the poses.
+void shift_residual(const Vec8& x, LinearizedResidual* residual);
 
 }  // namespace sovo

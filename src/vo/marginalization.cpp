@@ -4,26 +4,10 @@
 #include <cmath>
 
 #include "sovo/vo/bundle_adjustment.h"
-#include "sovo/vo/linearization.h"
 
 namespace sovo {
 
 namespace {
-
-/// Linearizes all residuals of a point and moves them to the frozen poses; the depth keeps its
-/// present value as linearization point.
-void relinearize_at_frozen_poses(const WindowConfig& config, const PointRef& ref, Window* window) {
-  for (int t = 0; t < window->size(); ++t) {
-    Residual& r = ref.point->residuals[static_cast<std::size_t>((*window)[t].slot)];
-    if (r.state == ResidualState::kAbsent) continue;
-    linearize(*window, config, ref.host, t, *ref.point, &r);
-    r.state = r.new_state;
-    if (r.state != ResidualState::kIn) continue;
-    const Vec8 relative =
-        (*window)[t].x + window->pair(ref.host, t).adjoint_host * (*window)[ref.host].x;
-    shift_residual(relative, 0.0, &r);
-  }
-}
 
 /// Moves the eight states of keyframe `index` to the end.
 void move_to_end(int index, MatX* H, VecX* b) {
@@ -44,8 +28,10 @@ void move_to_end(int index, MatX* H, VecX* b) {
 void marginalize_points(const WindowConfig& config, const std::vector<PointRef>& points,
                         Window* window, WorkerPool* pool) {
   if (points.empty()) return;
-  for (const PointRef& ref : points) relinearize_at_frozen_poses(config, ref, window);
-  const NormalEquations system = accumulate(*window, points, pool);
+  PhotometricProblem problem(config, points, window, pool);
+  WindowLinearization linearized;
+  problem.linearize(problem.stored(), {.system = true, .at_frozen_poses = true}, &linearized);
+  const NormalEquations& system = linearized.system;
   Prior& prior = window->prior();
   prior.H += config.folding_weight * (system.top - system.schur);
   prior.b += config.folding_weight * (system.b_top - system.b_schur);

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "sovo/vo/direct_config.h"
-#include "sovo/vo/normal_equations.h"
+#include "sovo/vo/photometric_problem.h"
 #include "sovo/vo/window.h"
 #include "sovo/vo/worker_pool.h"
 

@@ -1,18 +1,13 @@
 #pragma once
 
-#include <vector>
+#include <array>
+#include <span>
 
-#include "sovo/vo/direct_config.h"
+#include "sovo/image/lanes.h"
+#include "sovo/vo/linearization.h"
 #include "sovo/vo/window.h"
-#include "sovo/vo/worker_pool.h"
 
 namespace sovo {
-
-/// A point and where it lives.
-struct PointRef {
-  int host = 0;  ///< Index in the window.
-  Point* point = nullptr;
-};
 
 /// Normal equations of the window's poses and brightnesses, 8 states a keyframe in window order.
 ///
@@ -27,18 +22,50 @@ struct NormalEquations {
   int residuals = 0;
 };
 
-/// All active points of the window, by host, in their order.
-std::vector<PointRef> collect_points(Window* window);
+/// An 8x8 block and an 8-vector in single precision: two lanes a row.
+struct LaneBlock {
+  std::array<std::array<Lane, 2>, 8> H;
+  std::array<Lane, 2> b;
+};
 
-/// Accumulates the residuals with state kIn of the points, and sets each point's `hessian` and
-/// `gradient`. Work is split into blocks of fixed size that are summed in order.
-NormalEquations accumulate(const Window& window, const std::vector<PointRef>& points,
-                           WorkerPool* pool);
+/// A residual of the point being added, into the keyframe with index `target`.
+struct TargetResidual {
+  int target = 0;
+  LinearizedResidual linearized;
+};
 
-/// J_rho,x^T of a point over all keyframes, 8n entries, from the `cross` of its residuals.
-void depth_row(const Window& window, const PointRef& ref, VecX* row);
+/// Sums over a few points of one host, in coordinates relative to each target (pose, a, b of the
+/// target while the host stays). Single precision: a run of points is short.
+class HostSums {
+ public:
+  void clear(int num_keyframes);
 
-/// How many points a block holds.
-inline constexpr int kPointBlock = 128;
+  /// Adds those residuals of a point that are inliers: J^T J and J^T r of each, and what
+  /// eliminating the point's depth takes away.
+  void add(std::span<const TargetResidual> residuals, double hessian, double gradient);
+
+  /// J^T J (upper triangle) and J^T r of the residuals into a keyframe.
+  const LaneBlock& top(int target) const { return top_[static_cast<std::size_t>(target)]; }
+  /// H_xp H_pp^-1 H_xp^T between two targets, a <= b; of a == b also H_xp H_pp^-1 b_p.
+  const LaneBlock& schur(int a, int b) const { return schur_[index(a, b)]; }
+  int residuals() const { return residuals_; }
+  int num_keyframes() const { return num_keyframes_; }
+
+ private:
+  static std::size_t index(int a, int b) { return static_cast<std::size_t>(b * (b + 1) / 2 + a); }
+
+  int num_keyframes_ = 0;
+  int residuals_ = 0;
+  std::array<LaneBlock, kMaxSlots> top_;
+  std::array<LaneBlock, static_cast<std::size_t>(kMaxSlots) * (kMaxSlots + 1) / 2> schur_;
+};
+
+/// Adds the sums of a host's runs, in their order and in double precision, to the system:
+/// J_target = J, J_host = J * adjoint_host.
+void add_host(const Window& window, int host, std::span<const HostSums> runs,
+              NormalEquations* system);
+
+/// An empty system of a window's size.
+NormalEquations empty_system(const Window& window);
 
 }  // namespace sovo

@@ -2,8 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-
-#include "sovo/vo/linearization.h"
+#include <utility>
 
 namespace sovo {
 
@@ -14,7 +13,6 @@ constexpr double kStartLambda = 0.1;
 constexpr double kStopStep = 1e-4;         // relative
 constexpr double kMinInformation = 100.0;  // H_rho_rho * mean_rho^2
 constexpr int kCandidateBlock = 32;
-constexpr float kNotSelected = -1.0F;
 
 bool is_ready(const ImmaturePoint& p, const PointConfig& config) {
   const bool traced = p.state == TraceState::kGood || p.state == TraceState::kSkipped ||
@@ -29,38 +27,59 @@ bool is_dead(const ImmaturePoint& p, bool host_leaves) {
   return p.state == TraceState::kOutOfView || host_leaves;
 }
 
+/// Pixel of pyramid level 1 at which a point is seen; nothing when it is not.
+struct LevelOnePixel {
+  int x = 0, y = 0;
+  bool seen = false;
+};
+
+LevelOnePixel project(const PairGeometry& g, const OccupancyMap& map, float u, float v, float rho) {
+  const Eigen::Vector3f p = g.KRKi * Eigen::Vector3f(u, v, 1.0F) + g.Kt * rho;
+  // (p + 0.5) / 2 - 0.5, rounded.
+  const float x = 0.5F * (p.x() / p.z() + 0.5F);
+  const float y = 0.5F * (p.y() / p.z() + 0.5F);
+  // Written so that NaN counts as not seen.
+  const bool seen = p.z() > 0.0F && x >= 1.0F && y >= 1.0F &&
+                    x < static_cast<float>(map.width() - 1) &&
+                    y < static_cast<float>(map.height() - 1);
+  if (!seen) return {};
+  return {static_cast<int>(x), static_cast<int>(y), true};
+}
+
 }  // namespace
 
-DistanceMap::DistanceMap(int width, int height) : distance_(width / 2, height / 2) {
-  distance_.fill(kMaxDistance);
+OccupancyMap::OccupancyMap(int width, int height)
+    : width_(width),
+      height_(height),
+      words_(static_cast<std::size_t>(width) / 64 + 2),  // one more: rows are read two at a time
+      bits_(words_ * static_cast<std::size_t>(height)) {}
+
+void OccupancyMap::take(int x, int y) {
+  const auto column = static_cast<std::size_t>(x);
+  bits_[static_cast<std::size_t>(y) * words_ + column / 64] |= std::uint64_t{1} << column % 64;
 }
 
-void DistanceMap::stamp(float u, float v) {
-  constexpr int kRadius = static_cast<int>(kMaxDistance);
-  const int cx = static_cast<int>(u);
-  const int cy = static_cast<int>(v);
-  for (int y = std::max(0, cy - kRadius); y <= std::min(distance_.height() - 1, cy + kRadius);
-       ++y) {
-    float* row = distance_.row(y);
-    const int dy = std::abs(y - cy);
-    for (int x = std::max(0, cx - kRadius); x <= std::min(distance_.width() - 1, cx + kRadius);
-         ++x) {
-      const int dx = std::abs(x - cx);
-      // Octagonal norm: close to Euclidean, whole-number arithmetic.
-      const float d =
-          static_cast<float>(std::max(dx, dy)) + 0.5F * static_cast<float>(std::min(dx, dy));
-      row[x] = std::min(row[x], d);
-    }
-  }
+bool OccupancyMap::any_in_row(int y, int first_x, int last_x) const {
+  const auto first = static_cast<std::size_t>(std::max(0, first_x));
+  const auto last = static_cast<std::size_t>(std::min(width_ - 1, last_x));
+  const std::uint64_t* word = &bits_[static_cast<std::size_t>(y) * words_ + first / 64];
+  const std::size_t shift = first % 64;
+  std::uint64_t bits = word[0] >> shift;
+  if (shift > 0) bits |= word[1] << (64 - shift);
+  return (bits & ((std::uint64_t{2} << (last - first)) - 1)) != 0;
 }
 
-float DistanceMap::at(float u, float v) const {
-  const int x = static_cast<int>(u);
-  const int y = static_cast<int>(v);
-  if (x < 1 || y < 1 || x >= distance_.width() - 1 || y >= distance_.height() - 1) {
-    return kNotSelected;
+bool OccupancyMap::any_closer(int x, int y, float distance) const {
+  const auto octagonal = [](int a, int b) {
+    return static_cast<float>(std::max(a, b)) + 0.5F * static_cast<float>(std::min(a, b));
+  };
+  int reach = static_cast<int>(distance);  // shrinks away from the row
+  for (int dy = 0; octagonal(0, dy) < distance; ++dy) {
+    while (octagonal(reach, dy) >= distance) --reach;
+    if (y - dy >= 0 && any_in_row(y - dy, x - reach, x + reach)) return true;
+    if (y + dy < height_ && any_in_row(y + dy, x - reach, x + reach)) return true;
   }
-  return distance_.at(x, y);
+  return false;
 }
 
 void PointActivator::adapt_spacing(int active) {
@@ -80,22 +99,12 @@ void PointActivator::adapt_spacing(int active) {
 std::vector<PointActivator::Candidate> PointActivator::choose(Window* window) const {
   const int newest = window->size() - 1;
   const ImageF& image = window->newest().image();
-  DistanceMap map(image.width(), image.height());
-  const auto project = [&](int host, float pu, float pv, float rho, float* u, float* v) {
-    const PairGeometry& g = window->pair(host, newest);
-    const Eigen::Vector3f p = g.KRKi * Eigen::Vector3f(pu, pv, 1.0F) + g.Kt * rho;
-    *u = 0.5F * (p.x() / p.z() + 0.5F) - 0.5F + 0.5F;  // level 1, rounded by truncation
-    *v = 0.5F * (p.y() / p.z() + 0.5F) - 0.5F + 0.5F;
-    return p.z() > 0.0F && std::isfinite(*u) && std::isfinite(*v) && std::abs(*u) < 1e6F &&
-           std::abs(*v) < 1e6F;
-  };
-  float u = 0.0F;
-  float v = 0.0F;
+  OccupancyMap map(image.width() / 2, image.height() / 2);
   for (int h = 0; h < newest; ++h) {
     for (const Point& p : (*window)[h].points) {
-      if (project(h, p.u, p.v, static_cast<float>(p.rho), &u, &v) && map.at(u, v) >= 0.0F) {
-        map.stamp(u, v);
-      }
+      const LevelOnePixel at =
+          project(window->pair(h, newest), map, p.u, p.v, static_cast<float>(p.rho));
+      if (at.seen) map.take(at.x, at.y);
     }
   }
   std::vector<Candidate> chosen;
@@ -107,12 +116,12 @@ std::vector<PointActivator::Candidate> PointActivator::choose(Window* window) co
         if (is_dead(p, host.leaving)) chosen.push_back({h, i, std::nullopt, true});
         continue;
       }
-      const bool in_front = project(h, p.u, p.v, 0.5F * (p.rho_min + p.rho_max), &u, &v);
-      const float distance = in_front ? map.at(u, v) : kNotSelected;
-      if (distance < 0.0F) {
+      const LevelOnePixel at =
+          project(window->pair(h, newest), map, p.u, p.v, 0.5F * (p.rho_min + p.rho_max));
+      if (!at.seen) {
         chosen.push_back({h, i, std::nullopt, true});
-      } else if (distance >= min_distance_ * static_cast<float>(p.type)) {
-        map.stamp(u, v);
+      } else if (!map.any_closer(at.x, at.y, min_distance_ * static_cast<float>(p.type))) {
+        map.take(at.x, at.y);
         chosen.push_back({h, i, std::nullopt, false});
       }
     }
@@ -120,7 +129,36 @@ std::vector<PointActivator::Candidate> PointActivator::choose(Window* window) co
   return chosen;
 }
 
-void PointActivator::optimize(const Window& window, Candidate* candidate) const {
+void PointActivator::evaluate(const Window& window, const Candidate& candidate, const Point& point,
+                              double slack, DepthEvaluation* out) const {
+  const float threshold = window[candidate.host].immature[candidate.index].energy_threshold;
+  const Residual fresh{.state = ResidualState::kIn};
+  std::array<PatternProjection, kMaxSlots> projections;
+  for (int t = 0; t < window.size(); ++t) {
+    if (t == candidate.host) continue;
+    PatternProjection& projection = projections[static_cast<std::size_t>(t)];
+    project_pattern(window, candidate.host, t, point, &projection);
+    prefetch_pattern(window, t, projection);
+  }
+  out->energy = out->hessian = out->gradient = 0.0;
+  for (int t = 0; t < window.size(); ++t) {
+    if (t == candidate.host) continue;
+    const auto k = static_cast<std::size_t>(t);
+    LinearizedResidual& r = out->residuals[k];
+    linearize_projected(window, window_config_, candidate.host, t, point, fresh, projections[k],
+                        &r);
+    if (r.state == ResidualState::kOutOfView) {
+      out->energy += threshold;
+      continue;
+    }
+    const bool inlier = r.raw_energy < threshold * slack && r.gram[0] + r.gram[4] >= 2.0F;
+    r.state = inlier ? ResidualState::kIn : ResidualState::kOutlier;
+    out->energy += inlier ? r.raw_energy : threshold * slack;
+    if (inlier) accumulate_depth(r, &out->hessian, &out->gradient);
+  }
+}
+
+void PointActivator::optimize(const Window& window, double mean_rho, Candidate* candidate) const {
   const Keyframe& host = window[candidate->host];
   const ImmaturePoint& immature = host.immature[candidate->index];
   Point p;
@@ -131,41 +169,21 @@ void PointActivator::optimize(const Window& window, Candidate* candidate) const 
   p.type = immature.type;
   p.rho = std::max(0.5 * (static_cast<double>(immature.rho_min) + immature.rho_max), 1e-6);
 
-  const auto evaluate = [&](double slack, double* energy, double* hessian, double* gradient) {
-    *energy = *hessian = *gradient = 0.0;
-    for (int t = 0; t < window.size(); ++t) {
-      if (t == candidate->host) continue;
-      Residual& r = p.residuals[static_cast<std::size_t>(window[t].slot)];
-      r.state = ResidualState::kIn;
-      linearize(window, window_config_, candidate->host, t, p, &r);
-      const float threshold = immature.energy_threshold;
-      if (r.new_state == ResidualState::kOutOfView) {
-        *energy += threshold;
-        continue;
-      }
-      const bool inlier = r.raw_energy < threshold * slack && r.gram[0] + r.gram[4] >= 2.0F;
-      r.new_state = inlier ? ResidualState::kIn : ResidualState::kOutlier;
-      *energy += inlier ? r.raw_energy : threshold * slack;
-      if (inlier) accumulate_depth(r, hessian, gradient);
-    }
-  };
-  double energy, hessian, gradient;
-  evaluate(1e3, &energy, &hessian, &gradient);
-  const double unit = std::pow(window.mean_inverse_depth(), 2);
+  DepthEvaluation now;
+  evaluate(window, *candidate, p, 1e3, &now);
+  const double unit = mean_rho * mean_rho;
   double lambda = kStartLambda;
-  if (hessian * unit < kMinInformation) return;  // stays immature
+  if (now.hessian * unit < kMinInformation) return;  // stays immature
   double best_rho = p.rho;
-  evaluate(1.0, &energy, &hessian, &gradient);
-  for (int it = 0; it < kIterations && hessian * unit >= kMinInformation; ++it) {
-    const double step = gradient / (hessian * (1.0 + lambda));
+  evaluate(window, *candidate, p, 1.0, &now);
+  DepthEvaluation next;
+  for (int it = 0; it < kIterations && now.hessian * unit >= kMinInformation; ++it) {
+    const double step = now.gradient / (now.hessian * (1.0 + lambda));
     p.rho = best_rho - step;
-    double new_energy, new_hessian, new_gradient;
-    evaluate(1.0, &new_energy, &new_hessian, &new_gradient);
-    if (new_energy < energy) {
+    evaluate(window, *candidate, p, 1.0, &next);
+    if (next.energy < now.energy) {
       best_rho = p.rho;
-      energy = new_energy;
-      hessian = new_hessian;
-      gradient = new_gradient;
+      std::swap(now, next);
       lambda *= 0.5;
     } else {
       lambda *= 5.0;
@@ -173,17 +191,13 @@ void PointActivator::optimize(const Window& window, Candidate* candidate) const 
     if (std::abs(step) < kStopStep * best_rho) break;
   }
   p.rho = best_rho;
-  evaluate(1.0, &energy, &hessian, &gradient);
-  p.hessian = hessian;
+  p.hessian = now.hessian;
   int inliers = 0;
   for (int t = 0; t < window.size(); ++t) {
-    Residual& r = p.residuals[static_cast<std::size_t>(window[t].slot)];
-    if (t == candidate->host || r.new_state != ResidualState::kIn) {
-      r = Residual();
-      continue;
-    }
-    r.state = ResidualState::kIn;
-    r.energy = r.raw_energy;
+    const LinearizedResidual& r = now.residuals[static_cast<std::size_t>(t)];
+    if (t == candidate->host || r.state != ResidualState::kIn) continue;
+    p.residuals[static_cast<std::size_t>(window[t].slot)] = {ResidualState::kIn, r.raw_energy,
+                                                             r.centre_u, r.centre_v, r.centre_rho};
     ++inliers;
   }
   candidate->discard = true;  // the immature point goes, as an active one or for good
@@ -198,11 +212,12 @@ void PointActivator::optimize(const Window& window, Candidate* candidate) const 
 int PointActivator::activate(Window* window) {
   adapt_spacing(window->num_active_points());
   std::vector<Candidate> candidates = choose(window);
+  const double mean_rho = window->mean_inverse_depth();
   const int total = static_cast<int>(candidates.size());
   pool_->run((total + kCandidateBlock - 1) / kCandidateBlock, [&](int block) {
     for (int i = block * kCandidateBlock; i < std::min(total, (block + 1) * kCandidateBlock); ++i) {
       Candidate& c = candidates[static_cast<std::size_t>(i)];
-      if (!c.discard) optimize(*window, &c);
+      if (!c.discard) optimize(*window, mean_rho, &c);
     }
   });
   int activated = 0;

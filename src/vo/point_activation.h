@@ -1,26 +1,43 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
 #include "sovo/vo/direct_config.h"
+#include "sovo/vo/linearization.h"
 #include "sovo/vo/window.h"
 #include "sovo/vo/worker_pool.h"
 
 namespace sovo {
 
-/// Distance of each pixel of pyramid level 1 to the nearest point stamped into it [px of level 1].
-class DistanceMap {
+/// Which pixels of an image are taken, and whether there is one near.
+class OccupancyMap {
  public:
-  /// Farther is not told apart.
-  static constexpr float kMaxDistance = 20.0F;
+  OccupancyMap(int width, int height);
+  int width() const { return width_; }
+  int height() const { return height_; }
 
-  DistanceMap(int width, int height);
-  void stamp(float u, float v);
-  float at(float u, float v) const;
+  /// Takes a pixel of the image.
+  void take(int x, int y);
+  /// Whether a taken pixel is closer than `distance` (at most 30), in the octagonal norm
+  /// max(|dx|, |dy|) + min(|dx|, |dy|) / 2: close to the Euclidean one, in whole numbers.
+  bool any_closer(int x, int y, float distance) const;
 
  private:
-  ImageF distance_;
+  bool any_in_row(int y, int first_x, int last_x) const;
+
+  int width_, height_;
+  std::size_t words_;  ///< 64 pixels each, in a row.
+  std::vector<std::uint64_t> bits_;
+};
+
+/// A candidate's depth measured in all keyframes.
+struct DepthEvaluation {
+  std::array<LinearizedResidual, kMaxSlots> residuals;  ///< By window index; not of the host.
+  double energy = 0.0, hessian = 0.0, gradient = 0.0;
 };
 
 /// Chooses immature points whose interval is narrow, spreads them evenly over the newest keyframe,
@@ -45,7 +62,9 @@ class PointActivator {
   };
   void adapt_spacing(int active);
   std::vector<Candidate> choose(Window* window) const;
-  void optimize(const Window& window, Candidate* candidate) const;
+  void optimize(const Window& window, double mean_rho, Candidate* candidate) const;
+  void evaluate(const Window& window, const Candidate& candidate, const Point& point, double slack,
+                DepthEvaluation* out) const;
 
   PointConfig config_;
   WindowConfig window_config_;

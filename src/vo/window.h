@@ -36,24 +36,10 @@ enum class ResidualState : std::uint8_t {
   kOutOfView,  ///< Left the target image; stays out.
 };
 
-/// Photometric residual of a point's pattern in one target keyframe, and its linearization in
-/// compact form. With the pattern's Jacobian rows J_i = [g_i^T D, ja_i, jb_i] (image gradient g_i,
-/// geometric Jacobian D at the centre pixel, brightness), all that the normal equations need is
-/// the 4x4 Gram matrix of (gx, gy, ja, jb), its product with r, and D.
+/// What the window keeps of the photometric residual of a point's pattern in one target keyframe.
 struct Residual {
   ResidualState state = ResidualState::kAbsent;
-  ResidualState new_state = ResidualState::kAbsent;  ///< Of the newest linearization.
-  float energy = 0.0F;                               ///< Accepted; outliers count their threshold.
-  float new_energy = 0.0F;
-  float raw_energy = 0.0F;  ///< As measured, outlier or not.
-
-  std::array<float, 10> gram{};     ///< Upper triangle of sum [gx gy ja jb]^T [gx gy ja jb].
-  std::array<float, 4> gram_r{};    ///< sum [gx gy ja jb]^T r.
-  float rr = 0.0F;                  ///< sum r^2 (weighted).
-  std::array<float, 6> du{}, dv{};  ///< d (u, v) / d (relative pose): translation, rotation [px].
-  float du_rho = 0.0F, dv_rho = 0.0F;  ///< d (u, v) / d (inverse depth) [px m].
-  std::array<float, 8> cross{};        ///< J_pose^T J_rho of this residual, relative coordinates.
-
+  float energy = 0.0F;                     ///< Accepted; outliers count their threshold.
   float centre_u = 0.0F, centre_v = 0.0F;  ///< Projection of the centre pixel [px].
   float centre_rho = 0.0F;                 ///< Inverse depth in the target [1/m].
 };
@@ -65,8 +51,6 @@ struct Point {
   std::array<float, kPatternSize> weight{};  ///< Gradient weights of the pattern.
   std::uint8_t type = 1;                     ///< Block size of the selection: 1, 2, 4.
   double rho = 0.0;                          ///< Inverse depth, current estimate [1/m].
-  double rho_backup = 0.0;
-  double step = 0.0;
   double hessian = 0.0;            ///< H_rho_rho of the newest linearization, without priors.
   double gradient = 0.0;           ///< b_rho.
   float relative_baseline = 0.0F;  ///< Largest baseline * rho of its good residuals.
@@ -98,7 +82,6 @@ struct Keyframe {
   SE3 frozen_T_camera_world;
   Affine frozen_affine;
   Vec8 x = Vec8::Zero();
-  Vec8 x_backup = Vec8::Zero();
   SE3 T_camera_world;  ///< exp(x) * frozen.
   Affine affine;       ///< frozen + x.
 

@@ -38,9 +38,8 @@ Window perturbed_window(double size) {
 double energy_of(const WindowConfig& config, Window* window) {
   WorkerPool pool(1);
   BundleAdjuster adjuster(config, &pool);
-  std::vector<PointRef> points = collect_points(window);
   window->newest().outlier_threshold = 1e9;
-  return adjuster.linearize_all(window, &points) + adjuster.prior_energy(*window);
+  return linearized(config, window).energy + adjuster.prior_energy(*window);
 }
 
 int residuals_of(const Window& window) {
@@ -194,17 +193,14 @@ TEST(FramePrior, HoldsTheFirstKeyframeAndPullsBrightnessToZero) {
 
 TEST(NormalEquations, DependOnlyOnResidualsThatTakePart) {
   Window window = scene_window(3, 12);
-  WorkerPool pool(1);
-  BundleAdjuster adjuster(WindowConfig(), &pool);
-  std::vector<PointRef> points = collect_points(&window);
-  adjuster.linearize_all(&window, &points);
-  accept(&points);
-  const NormalEquations all = accumulate(window, points, &pool);
+  const NormalEquations all = linearized(WindowConfig(), &window).system;
   EXPECT_LT((all.top - all.top.transpose()).norm(), 1e-9 * all.top.norm());
   EXPECT_LT((all.schur - all.schur.transpose()).norm(), 1e-9 * all.schur.norm());
   const auto slot = static_cast<std::size_t>(window[2].slot);
-  for (const PointRef& ref : points) ref.point->residuals[slot].state = ResidualState::kOutlier;
-  const NormalEquations fewer = accumulate(window, points, &pool);
+  for (const PointRef& ref : collect_points(&window)) {
+    ref.point->residuals[slot].state = ResidualState::kOutOfView;
+  }
+  const NormalEquations fewer = linearized(WindowConfig(), &window).system;
   EXPECT_LT(fewer.residuals, all.residuals);
   EXPECT_TRUE(fewer.top.bottomRows(8).isZero());
   EXPECT_TRUE(fewer.schur.bottomRows(8).isZero());

@@ -152,6 +152,9 @@ TEST_F(PlaneSearch, PatternThatIsBlindOrOutsideMakesNoPoint) {
   EXPECT_FALSE(make_immature_point(host_, 94.0F, 60.0F, 1, config_, 50.0, &p));
 }
 
+/// Of the pattern's pixels, the i-th.
+float nth(const std::array<Lane, 2>& lanes, std::size_t i) { return lanes[i / kLanes][i % kLanes]; }
+
 TEST(LineResiduals, SlopesAreCentralDifferencesOfTheResiduals) {
   const WaveImage host_wave{.phase = 0.4};
   const WaveImage target_wave{.phase = -0.9};
@@ -162,7 +165,7 @@ TEST(LineResiduals, SlopesAreCentralDifferencesOfTheResiduals) {
   const BrightnessTransfer transfer{1.3, -12.0};
   const HostGeometry g = host_geometry(
       small_camera(), SE3(SO3::exp(Vec3(0.02, -0.03, 0.25)), Vec3(-0.1, 0.02, 0.0)), transfer);
-  const WarpedPattern pattern = warp_pattern(g);
+  const SearchPattern pattern = search_pattern(g, p);
   constexpr float kU = 96.3F;
   constexpr float kV = 64.8F;
   constexpr float kStep = 0.5F;
@@ -170,7 +173,7 @@ TEST(LineResiduals, SlopesAreCentralDifferencesOfTheResiduals) {
     const float dx = std::cos(static_cast<float>(2.0 * M_PI * k / 16.0));
     const float dy = std::sin(static_cast<float>(2.0 * M_PI * k / 16.0));
     const auto at = [&](float t) {
-      return line_residuals(target, g, pattern, p, kU + t * dx, kV + t * dy, dx, dy);
+      return line_residuals(target, pattern, kU + t * dx, kV + t * dy, dx, dy);
     };
     const LineResiduals here = at(0.0F);
     const LineResiduals ahead = at(kStep);
@@ -178,11 +181,11 @@ TEST(LineResiduals, SlopesAreCentralDifferencesOfTheResiduals) {
     float steepest = 0.0F;
     for (std::size_t i = 0; i < kPatternSize; ++i) {
       const double expected =
-          target_wave(kU + pattern[i].x, kV + pattern[i].y) -
+          target_wave(kU + nth(pattern.x, i), kV + nth(pattern.y, i)) -
           (transfer.gain * host_wave(120.0 + kPattern[i].x, 70.0 + kPattern[i].y) + transfer.bias);
-      EXPECT_NEAR(here.r[i], expected, 0.01) << "direction " << k << ", pixel " << i;
-      const float slope = (ahead.r[i] - behind.r[i]) / (2.0F * kStep);
-      EXPECT_NEAR(here.slope[i], slope, 1e-3) << "direction " << k << ", pixel " << i;
+      EXPECT_NEAR(nth(here.r, i), expected, 0.01) << "direction " << k << ", pixel " << i;
+      const float slope = (nth(ahead.r, i) - nth(behind.r, i)) / (2.0F * kStep);
+      EXPECT_NEAR(nth(here.slope, i), slope, 1e-3) << "direction " << k << ", pixel " << i;
       steepest = std::max(steepest, std::abs(slope));
     }
     EXPECT_GT(steepest, 0.02F) << "nothing to be wrong about in direction " << k;
@@ -194,10 +197,10 @@ TEST(LineResiduals, PatternIsWarpedAsTheImageTurns) {
   const CameraModel camera = make_camera(200, 150, 170, 170, 99.5, 74.5);
   const HostGeometry g =
       host_geometry(camera, SE3(SO3::exp(Vec3(0, 0, M_PI / 2)), Vec3::Zero()), {});
-  const WarpedPattern pattern = warp_pattern(g);
+  const SearchPattern pattern = search_pattern(g, {});
   for (std::size_t i = 0; i < kPatternSize; ++i) {
-    EXPECT_NEAR(pattern[i].x, -kPattern[i].y, 1e-5) << i;
-    EXPECT_NEAR(pattern[i].y, kPattern[i].x, 1e-5) << i;
+    EXPECT_NEAR(nth(pattern.x, i), -kPattern[i].y, 1e-5) << i;
+    EXPECT_NEAR(nth(pattern.y, i), kPattern[i].x, 1e-5) << i;
   }
 }
 

@@ -124,13 +124,7 @@ class Marginalization : public ::testing::Test {
     }
   }
 
-  NormalEquations linearized_system() {
-    BundleAdjuster adjuster(config_, &pool_);
-    std::vector<PointRef> points = collect_points(&window_);
-    adjuster.linearize_all(&window_, &points);
-    accept(&points);
-    return accumulate(window_, points, &pool_);
-  }
+  NormalEquations linearized_system() { return linearized(config_, &window_).system; }
 
   VecX solve(const NormalEquations& system) {
     return BundleAdjuster(config_, &pool_).solve(window_, system, 0.0, false);

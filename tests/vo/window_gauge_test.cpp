@@ -26,12 +26,14 @@ class WindowGauge : public ::testing::Test {
       : pool_(1),
         adjuster_(without_priors(), &pool_),
         window_(scene_window(kKeyframes, 6, 1)),
-        points_(collect_points(&window_)) {}
+        problem_(without_priors(), collect_points(&window_), &window_, &pool_) {}
 
   NormalEquations linearized_system() {
-    energy_ = adjuster_.linearize_all(&window_, &points_);
-    accept(&points_);
-    return accumulate(window_, points_, &pool_);
+    WindowLinearization linearized;
+    problem_.linearize(problem_.stored(), {}, &linearized);
+    problem_.write_back(linearized);
+    energy_ = linearized.energy;
+    return linearized.system;
   }
 
   /// The reduced normal matrix in comparable units.
@@ -43,7 +45,7 @@ class WindowGauge : public ::testing::Test {
   WorkerPool pool_;
   BundleAdjuster adjuster_;
   Window window_;
-  std::vector<PointRef> points_;
+  PhotometricProblem problem_;
   double energy_ = 0.0;
 };
 
@@ -70,7 +72,7 @@ Eigen::Index nullity(const MatX& H, Eigen::Index expected) {
 
 TEST_F(WindowGauge, MotionAndScaleOfTheWorldAreUnobservable) {
   const MatX H = reduced(linearized_system());
-  ASSERT_GT(points_.size(), 300U);
+  ASSERT_GT(problem_.points().size(), 300U);
   const MatX basis = BundleAdjuster::gauge_basis(window_, BundleAdjuster::state_units(window_));
   ASSERT_EQ(basis.cols(), 7);
   for (Eigen::Index c = 0; c < basis.cols(); ++c) {
@@ -164,7 +166,7 @@ TEST_F(WindowGauge, OtherThanASimilarityChangesTheEnergy) {
   // What the tests above would miss if the energy did not depend on lengths at all.
   linearized_system();
   const double energy = energy_;
-  for (const PointRef& ref : points_) ref.point->rho *= 1.05;
+  for (const PointRef& ref : problem_.points()) ref.point->rho *= 1.05;
   linearized_system();
   EXPECT_GT(energy_, 1.2 * energy);
 }

@@ -9,6 +9,7 @@
 #include "sovo/vo/bundle_adjustment.h"
 #include "sovo/vo/epipolar_search.h"
 #include "sovo/vo/linearization.h"
+#include "sovo/vo/photometric_problem.h"
 #include "sovo/vo/window.h"
 #include "support/cameras.h"
 #include "support/synthetic_scene.h"
@@ -188,15 +189,13 @@ inline Window scene_window(int n, int stride = 7, std::uint32_t first_id = 0) {
   return window;
 }
 
-/// Takes the newest linearization's states, as bundle adjustment does.
-inline void accept(std::vector<PointRef>* points) {
-  for (const PointRef& ref : *points) {
-    for (Residual& r : ref.point->residuals) {
-      if (r.state == ResidualState::kAbsent || r.state == ResidualState::kOutOfView) continue;
-      r.state = r.new_state;
-      r.energy = r.new_energy;
-    }
-  }
+/// All residuals of a window at its present estimate.
+inline WindowLinearization linearized(const WindowConfig& config, Window* window) {
+  WorkerPool pool(1);
+  PhotometricProblem problem(config, collect_points(window), window, &pool);
+  WindowLinearization out;
+  problem.linearize(problem.stored(), {}, &out);
+  return out;
 }
 
 /// Displacements away from the linearization points, of the size that a window sees; the keyframe

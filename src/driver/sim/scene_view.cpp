@@ -64,9 +64,11 @@ SOVO_SIM_KERNEL void cover_quad(const SurfaceView& view, int index, const Rays& 
     const float t = height / (n0 * dx[k] + n1 * dy[k] + n2 * dz[k]);
     const float x = fu + t * (u0 * dx[k] + u1 * dy[k] + u2 * dz[k]);
     const float y = fv + t * (v0 * dx[k] + v1 * dy[k] + v2 * dz[k]);
-    const bool hit = (t > kNear) & (t < range[k]) & (std::abs(x) <= hu) & (std::abs(y) <= hv);
-    range[k] = hit ? t : range[k];
-    surface[k] = hit ? index : surface[k];
+    // Not &&: its branches would keep the loop from being vectorized.
+    const int hit = static_cast<int>(t > kNear) & static_cast<int>(t < range[k]) &
+                    static_cast<int>(std::abs(x) <= hu) & static_cast<int>(std::abs(y) <= hv);
+    range[k] = hit != 0 ? t : range[k];
+    surface[k] = hit != 0 ? index : surface[k];
   }
 }
 

@@ -27,8 +27,8 @@ struct SurfaceView {
   float radius = 0.0F;    ///< Of the ball around its centre that holds it.
 };
 
-/// Range at which `ray` (unit, or nearly) meets the surface, or infinity.
-float range_along(const SurfaceView& view, const Eigen::Vector3f& ray);
+/// Range at which the ray `d` (unit, or nearly) meets the surface, or infinity.
+float range_along(const SurfaceView& view, const Eigen::Vector3f& d);
 
 /// Components of unit rays, in the camera's frame.
 struct Rays {

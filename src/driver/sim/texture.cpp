@@ -41,7 +41,8 @@ Texture::Texture(const ImageF& pattern) {
   mean_ = std::clamp(levels.back().at(0, 0), 0.0F, 1.0F);
   levels.pop_back();
   quads_.reserve(2 * pattern.size());
-  for (auto level = levels.rbegin(); level != levels.rend(); ++level) append_quads(*level, &quads_);
+  std::reverse(levels.begin(), levels.end());
+  for (const ImageF& level : levels) append_quads(level, &quads_);
   quads_.shrink_to_fit();
 }
 

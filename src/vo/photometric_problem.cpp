@@ -1,0 +1,208 @@
+#include "sovo/vo/photometric_problem.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "sovo/vo/linearization.h"
+
+namespace sovo {
+
+namespace {
+
+/// Points whose patterns are projected, and their images asked for, before the first is sampled.
+constexpr std::size_t kAhead = 4;
+
+constexpr double kMinHessian = 1e-10;
+
+std::size_t pair_index(int host, int target) {
+  return static_cast<std::size_t>(host) * kMaxSlots + static_cast<std::size_t>(target);
+}
+
+Residual known_residual(const StoredResidual& r) {
+  return {r.state, r.energy, r.centre_u, r.centre_v, r.centre_rho};
+}
+
+void store(const LinearizedResidual& r, StoredResidual* out) {
+  out->cross = r.cross;
+  out->energy = r.energy;
+  out->raw_energy = r.raw_energy;
+  out->centre_u = r.centre_u;
+  out->centre_v = r.centre_v;
+  out->centre_rho = r.centre_rho;
+  out->state = r.state;
+}
+
+}  // namespace
+
+std::vector<PointRef> collect_points(Window* window) {
+  std::vector<PointRef> refs;
+  refs.reserve(static_cast<std::size_t>(window->num_active_points()));
+  for (int i = 0; i < window->size(); ++i) {
+    for (Point& p : (*window)[i].points) refs.push_back({i, &p});
+  }
+  return refs;
+}
+
+std::vector<Vec8> relative_displacements(const Window& window, const VecX& x) {
+  std::vector<Vec8> relative(static_cast<std::size_t>(kMaxSlots) * kMaxSlots, Vec8::Zero());
+  for (int h = 0; h < window.size(); ++h) {
+    for (int t = 0; t < window.size(); ++t) {
+      if (h == t) continue;
+      relative[pair_index(h, t)] =
+          x.segment<8>(8 * t) + window.pair(h, t).adjoint_host * x.segment<8>(8 * h);
+    }
+  }
+  return relative;
+}
+
+PhotometricProblem::PhotometricProblem(const WindowConfig& config, std::vector<PointRef> points,
+                                       Window* window, WorkerPool* pool)
+    : config_(config), points_(std::move(points)), window_(window), pool_(pool) {
+  first_.reserve(points_.size() + 1);
+  first_.push_back(0);
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    const PointRef& ref = points_[i];
+    std::size_t count = 0;
+    for (const Residual& r : ref.point->residuals) {
+      count += r.state != ResidualState::kAbsent ? 1 : 0;
+    }
+    first_.push_back(first_.back() + count);
+    const bool full = !blocks_.empty() && i - blocks_.back().begin == kPointBlock;
+    if (blocks_.empty() || full || blocks_.back().host != ref.host) {
+      blocks_.push_back({ref.host, i, i});
+    }
+    blocks_.back().end = i + 1;
+  }
+  sums_.resize(blocks_.size());
+}
+
+WindowLinearization PhotometricProblem::stored() const {
+  WindowLinearization out;
+  out.residuals.reserve(first_.back());
+  out.depths.reserve(points_.size());
+  for (const PointRef& ref : points_) {
+    out.depths.push_back({ref.point->hessian, ref.point->gradient});
+    for (int t = 0; t < window_->size(); ++t) {
+      const Residual& r = ref.point->residuals[static_cast<std::size_t>((*window_)[t].slot)];
+      if (r.state == ResidualState::kAbsent) continue;
+      StoredResidual s;
+      s.energy = r.energy;
+      s.centre_u = r.centre_u;
+      s.centre_v = r.centre_v;
+      s.centre_rho = r.centre_rho;
+      s.state = r.state;
+      s.target = static_cast<std::uint8_t>(t);
+      out.residuals.push_back(s);
+    }
+  }
+  return out;
+}
+
+void PhotometricProblem::linearize_block(const Block& block, const WindowLinearization& known,
+                                         const Request& request, WindowLinearization* out,
+                                         HostSums* sums, double* energy) const {
+  std::array<PatternProjection, kAhead * kMaxSlots> projections;
+  std::array<TargetResidual, kMaxSlots> residuals;
+  std::vector<Vec8> shifts;
+  if (request.at_frozen_poses) shifts = relative_displacements(*window_, window_->stacked_x());
+  const auto wanted = [&](std::size_t k) {
+    return (request.targets >> known.residuals[k].target & 1U) != 0;
+  };
+  sums->clear(window_->size());
+  *energy = 0.0;
+  for (std::size_t begin = block.begin; begin < block.end; begin += kAhead) {
+    const std::size_t end = std::min(block.end, begin + kAhead);
+    PatternProjection* projection = projections.data();
+    for (std::size_t i = begin; i < end; ++i) {
+      for (std::size_t k = first_[i]; k < first_[i + 1]; ++k) {
+        if (!wanted(k)) continue;
+        const int target = known.residuals[k].target;
+        project_pattern(*window_, block.host, target, *points_[i].point, projection);
+        prefetch_pattern(*window_, target, *projection++);
+      }
+    }
+    projection = projections.data();
+    for (std::size_t i = begin; i < end; ++i) {
+      std::size_t count = 0;
+      PointDepth depth;
+      for (std::size_t k = first_[i]; k < first_[i + 1]; ++k) {
+        if (!wanted(k)) continue;
+        TargetResidual& r = residuals[count++];
+        r.target = known.residuals[k].target;
+        *energy +=
+            linearize_projected(*window_, config_, block.host, r.target, *points_[i].point,
+                                known_residual(known.residuals[k]), *projection++, &r.linearized);
+        if (r.linearized.state == ResidualState::kIn) {
+          if (request.at_frozen_poses) {
+            shift_residual(shifts[pair_index(block.host, r.target)], &r.linearized);
+          }
+          accumulate_depth(r.linearized, &depth.hessian, &depth.gradient);
+        }
+        store(r.linearized, &out->residuals[k]);
+      }
+      out->depths[i] = depth;
+      if (request.system) {
+        sums->add({residuals.data(), count}, depth.hessian, depth.gradient);
+      }
+    }
+  }
+}
+
+void PhotometricProblem::linearize(const WindowLinearization& known, const Request& request,
+                                   WindowLinearization* out) {
+  if (out->residuals.size() != known.residuals.size()) *out = known;
+  std::vector<double> energies(blocks_.size());
+  pool_->run(static_cast<int>(blocks_.size()), [&](int i) {
+    const auto k = static_cast<std::size_t>(i);
+    linearize_block(blocks_[k], known, request, out, &sums_[k], &energies[k]);
+  });
+  out->energy = 0.0;
+  for (const double e : energies) out->energy += e;
+  if (!request.system) return;
+  out->system = empty_system(*window_);
+  for (std::size_t begin = 0; begin < blocks_.size();) {
+    std::size_t end = begin;
+    while (end < blocks_.size() && blocks_[end].host == blocks_[begin].host) ++end;
+    add_host(*window_, blocks_[begin].host, {&sums_[begin], end - begin}, &out->system);
+    begin = end;
+  }
+}
+
+void PhotometricProblem::step_depths(const WindowLinearization& at, const VecX& dx, double lambda) {
+  const std::vector<Vec8> relative = relative_displacements(*window_, dx);
+  std::vector<std::array<float, 8>> steps(relative.size());
+  for (std::size_t i = 0; i < relative.size(); ++i) {
+    for (std::size_t k = 0; k < 8; ++k) {
+      steps[i][k] = static_cast<float>(relative[i][static_cast<Eigen::Index>(k)]);
+    }
+  }
+  for (const Block& block : blocks_) {
+    for (std::size_t i = block.begin; i < block.end; ++i) {
+      const PointDepth& depth = at.depths[i];
+      if (depth.hessian <= kMinHessian) continue;
+      double b = depth.gradient;
+      for (std::size_t k = first_[i]; k < first_[i + 1]; ++k) {
+        const StoredResidual& r = at.residuals[k];
+        if (r.state != ResidualState::kIn) continue;
+        const std::array<float, 8>& step = steps[pair_index(block.host, r.target)];
+        b += static_cast<double>(sum_lane(load_lane(&r.cross[0]) * load_lane(&step[0]) +
+                                          load_lane(&r.cross[4]) * load_lane(&step[4])));
+      }
+      points_[i].point->rho -= b / (depth.hessian * (1.0 + lambda));
+    }
+  }
+}
+
+void PhotometricProblem::write_back(const WindowLinearization& from) {
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    Point& p = *points_[i].point;
+    p.hessian = from.depths[i].hessian;
+    p.gradient = from.depths[i].gradient;
+    for (std::size_t k = first_[i]; k < first_[i + 1]; ++k) {
+      const StoredResidual& r = from.residuals[k];
+      p.residuals[static_cast<std::size_t>((*window_)[r.target].slot)] = known_residual(r);
+    }
+  }
+}
+
+}  // namespace sovo

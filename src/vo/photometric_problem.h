@@ -1,0 +1,104 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "sovo/image/image.h"
+#include "sovo/vo/direct_config.h"
+#include "sovo/vo/normal_equations.h"
+#include "sovo/vo/window.h"
+#include "sovo/vo/worker_pool.h"
+
+namespace sovo {
+
+/// A point and where it lives.
+struct PointRef {
+  int host = 0;  ///< Index in the window.
+  Point* point = nullptr;
+};
+
+/// All active points of the window, by host, in their order.
+std::vector<PointRef> collect_points(Window* window);
+
+/// How many points of one host a block of work holds.
+inline constexpr int kPointBlock = 64;
+
+/// What is kept of a linearized residual: one cache line.
+struct alignas(64) StoredResidual {
+  std::array<float, 8> cross{};  ///< J_state^T J_rho, relative coordinates; of inliers.
+  float energy = 0.0F;
+  float raw_energy = 0.0F;
+  float centre_u = 0.0F, centre_v = 0.0F, centre_rho = 0.0F;
+  ResidualState state = ResidualState::kAbsent;
+  std::uint8_t target = 0;  ///< Index in the window.
+};
+
+/// A point's own H_rho_rho and b_rho.
+struct PointDepth {
+  double hessian = 0.0, gradient = 0.0;
+};
+
+/// All residuals of some points, linearized.
+struct WindowLinearization {
+  AlignedVector<StoredResidual> residuals;  ///< By point.
+  std::vector<PointDepth> depths;
+  NormalEquations system;
+  double energy = 0.0;
+};
+
+/// The photometric residuals of some points of a window, in the order in which they are worked on:
+/// blocks of fixed size, so that results do not depend on the number of threads.
+class PhotometricProblem {
+ public:
+  /// `points` by host.
+  PhotometricProblem(const WindowConfig& config, std::vector<PointRef> points, Window* window,
+                     WorkerPool* pool);
+
+  /// The residuals as the points have them.
+  WindowLinearization stored() const;
+
+  struct Request {
+    bool system = true;  ///< Whether the normal equations of the inliers are wanted.
+    /// Move residuals to the frozen poses; the depths keep their present values as linearization
+    /// point.
+    bool at_frozen_poses = false;
+    /// Bit i: whether residuals into keyframe i are linearized; others stay as they are in `out`.
+    std::uint32_t targets = std::numeric_limits<std::uint32_t>::max();
+  };
+
+  /// Linearizes at the present estimate. `known`: states so far; what is out of view stays so.
+  void linearize(const WindowLinearization& known, const Request& request,
+                 WindowLinearization* out);
+
+  /// Moves the depths by back-substitution of the poses' step `dx`, damped by `lambda`.
+  void step_depths(const WindowLinearization& at, const VecX& dx, double lambda);
+
+  /// Writes states, projections and information into the points.
+  void write_back(const WindowLinearization& from);
+
+  const std::vector<PointRef>& points() const { return points_; }
+
+ private:
+  struct Block {
+    int host = 0;
+    std::size_t begin = 0, end = 0;  ///< Points.
+  };
+  void linearize_block(const Block& block, const WindowLinearization& known, const Request& request,
+                       WindowLinearization* out, HostSums* sums, double* energy) const;
+
+  WindowConfig config_;
+  std::vector<PointRef> points_;
+  Window* window_;
+  WorkerPool* pool_;
+  std::vector<std::size_t> first_;  ///< First residual of each point, and one past the last.
+  std::vector<Block> blocks_;
+  std::vector<HostSums> sums_;  ///< Of each block.
+};
+
+/// Relative displacement of each pair for a displacement of all keyframes (8 a keyframe): J x of a
+/// residual is its relative Jacobian times it. Element host * kMaxSlots + target.
+std::vector<Vec8> relative_displacements(const Window& window, const VecX& x);
+
+}  // namespace sovo

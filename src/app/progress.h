@@ -16,6 +16,9 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
+  /// Whether there is a terminal to show it on.
+  bool enabled() const { return enabled_; }
+
   /// Shows that `frames` are done; at most ten times a second.
   void update(std::size_t frames, const std::string& note);
 

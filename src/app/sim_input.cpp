@@ -38,6 +38,7 @@ int export_sim(const AppConfig& config, const std::string& directory, bool depth
   bool stopped = false;
   const auto written = sim::export_dataset(source->get(), directory, depth, [&](std::size_t pairs) {
     progress.update(pairs, directory);
+    if (!progress.enabled() && pairs % 100 == 0) spdlog::info("{} pairs rendered", pairs);
     stopped = stop.requested();
     return !stopped;
   });

@@ -62,6 +62,7 @@ void OccupancyMap::take(int x, int y) {
 bool OccupancyMap::any_in_row(int y, int first_x, int last_x) const {
   const auto first = static_cast<std::size_t>(std::max(0, first_x));
   const auto last = static_cast<std::size_t>(std::min(width_ - 1, last_x));
+  if (last < first || last - first > 63) return false;  // the caller asks for neither
   const std::uint64_t* word = &bits_[static_cast<std::size_t>(y) * words_ + first / 64];
   const std::size_t shift = first % 64;
   std::uint64_t bits = word[0] >> shift;

@@ -34,15 +34,19 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-std::vector<std::uint8_t> intensities(const ImageF& image, const KeyframePoints& points) {
-  std::vector<std::uint8_t> out;
-  out.reserve(points.size());
+/// Gives `keyframe` its points, with the grey levels of its image.
+void set_points(const KeyframePoints& points, const ImageF& image, KeyframeOutput* keyframe) {
+  keyframe->u = points.u;
+  keyframe->v = points.v;
+  keyframe->inverse_depth = points.inverse_depth;
+  keyframe->sigma = points.sigma;
+  keyframe->intensity.reserve(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     const int x = std::clamp(static_cast<int>(points.u[i] + 0.5F), 0, image.width() - 1);
     const int y = std::clamp(static_cast<int>(points.v[i] + 0.5F), 0, image.height() - 1);
-    out.push_back(static_cast<std::uint8_t>(std::clamp(image.at(x, y), 0.0F, 255.0F)));
+    const float grey = std::clamp(image.at(x, y), 0.0F, 255.0F);
+    keyframe->intensity.push_back(static_cast<std::uint8_t>(grey));
   }
-  return out;
 }
 
 DepthProposal proposal_of(const StaticMatch& match) {
@@ -321,11 +325,7 @@ KeyframeOutput MapSegment::new_keyframe() const {
   out.scale_valid = metric();
   out.T_odom_left = vo_.window().newest().T_world_camera();
   out.log_scale = vo_.log_scale();
-  out.u = s.points.u;
-  out.v = s.points.v;
-  out.inverse_depth = s.points.inverse_depth;
-  out.sigma = s.points.sigma;
-  out.intensity = intensities(s.pyramid->level(0), s.points);
+  set_points(s.points, s.pyramid->level(0), &out);
   return out;
 }
 
@@ -335,11 +335,7 @@ KeyframeOutput MapSegment::own_points(const KeyframeState& state) const {
   out.id = state.id;
   out.segment = index_;
   out.stamp_ns = state.stamp_ns;
-  out.u = state.points.u;
-  out.v = state.points.v;
-  out.inverse_depth = state.points.inverse_depth;
-  out.sigma = state.points.sigma;
-  out.intensity = intensities(state.pyramid->level(0), state.points);
+  set_points(state.points, state.pyramid->level(0), &out);
   return out;
 }
 

@@ -7,9 +7,6 @@ namespace {
 /// Index of (i, j), i <= j, in the upper triangle of a 4x4 matrix stored by rows.
 constexpr std::size_t tri(std::size_t i, std::size_t j) { return i * 4 - i * (i + 1) / 2 + j; }
 
-/// Points whose depth is known less have none to eliminate.
-constexpr double kMinHessian = 1e-10;
-
 /// J^T J and J^T r of a residual: with D = [du; dv] and the Gram matrix G of (gx, gy, ja, jb), its
 /// upper left block is D^T G_gg D.
 void add_relative(const LinearizedResidual& r, LaneBlock* sums) {
@@ -123,7 +120,7 @@ void HostSums::clear(int num_keyframes) {
 }
 
 void HostSums::add(std::span<const TargetResidual> residuals, double hessian, double gradient) {
-  const bool has_depth = hessian > kMinHessian;
+  const bool has_depth = hessian > kMinDepthHessian;
   const float inverse = has_depth ? static_cast<float>(1.0 / hessian) : 0.0F;
   const auto scaled_gradient = static_cast<float>(gradient);
   for (std::size_t i = 0; i < residuals.size(); ++i) {

@@ -22,6 +22,9 @@ struct NormalEquations {
   int residuals = 0;
 };
 
+/// Points whose own H_rho_rho is less have no depth to eliminate, and none to step.
+inline constexpr double kMinDepthHessian = 1e-10;
+
 /// An 8x8 block and an 8-vector in single precision: two lanes a row.
 struct LaneBlock {
   std::array<std::array<Lane, 2>, 8> H;

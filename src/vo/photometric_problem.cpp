@@ -12,8 +12,6 @@ namespace {
 /// Points whose patterns are projected, and their images asked for, before the first is sampled.
 constexpr std::size_t kAhead = 4;
 
-constexpr double kMinHessian = 1e-10;
-
 std::size_t pair_index(int host, int target) {
   return static_cast<std::size_t>(host) * kMaxSlots + static_cast<std::size_t>(target);
 }
@@ -179,7 +177,7 @@ void PhotometricProblem::step_depths(const WindowLinearization& at, const VecX& 
   for (const Block& block : blocks_) {
     for (std::size_t i = block.begin; i < block.end; ++i) {
       const PointDepth& depth = at.depths[i];
-      if (depth.hessian <= kMinHessian) continue;
+      if (depth.hessian <= kMinDepthHessian) continue;
       double b = depth.gradient;
       for (std::size_t k = first_[i]; k < first_[i + 1]; ++k) {
         const StoredResidual& r = at.residuals[k];

@@ -131,14 +131,8 @@ TEST(KeyframeOutput, RevisedOnesHoldTheirOwnPointsAtTheirTrueDepths) {
 TEST(KeyframeOutput, DepthsHaveTheScaleOfThePose) {
   // The first right image comes from a rig with a shorter baseline: the map begins 7 % too long,
   // and the corrections that follow are undone in the keyframes before them.
-  StereoFrame start = drive_frame(0);
-  const SyntheticScene scene(3);
-  const StereoCameras cameras = test_cameras();
-  SE3 narrow = cameras.rig.T_right_left;
-  narrow.translation() *= 0.93;
-  start.right = side_of(scene.render(cameras.rig.right, narrow.inverse()));
   Playback run(small_window());
-  run.give(start);
+  run.give(first_frame_of_narrow_rig(0.93));
   run.give_drive(1, kFrames);
   run.odometry.finish();
   const double total = run.recorder.frames.back().log_scale;

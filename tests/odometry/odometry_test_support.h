@@ -61,6 +61,18 @@ inline StereoFrame drive_frame(int i) {
   return rendered.emplace(i, frame).first->second;
 }
 
+/// The first frame of the drive, as a rig sees it whose baseline is shorter by `factor`: depths
+/// come out 1 / factor too long. (The drive begins at the identity.)
+inline StereoFrame first_frame_of_narrow_rig(double factor) {
+  const SyntheticScene scene(3);
+  const StereoCameras cameras = test_cameras();
+  SE3 T_right_left = cameras.rig.T_right_left;
+  T_right_left.translation() *= factor;
+  StereoFrame frame = drive_frame(0);
+  frame.right = side_of(scene.render(cameras.rig.right, T_right_left.inverse()));
+  return frame;
+}
+
 /// The same frame with every pixel of a side set.
 inline StereoFrame with_left(StereoFrame frame, const std::function<int(int x, int y)>& value) {
   auto data = std::make_shared<std::vector<std::uint8_t>>(*frame.left.data);

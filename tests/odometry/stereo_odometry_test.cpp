@@ -133,15 +133,8 @@ TEST(StereoOdometry, TwoViewStartFindsItsScale) {
 }
 
 TEST(StereoOdometry, WrongScaleAtTheStartIsCorrected) {
-  // The first right image comes from a rig with a shorter baseline: its depths are too long.
-  StereoFrame first = drive_frame(0);
-  const SyntheticScene scene(3);
-  const StereoCameras cameras = test_cameras();
-  SE3 narrow = cameras.rig.T_right_left;
-  narrow.translation() *= 0.93;
-  first.right = side_of(scene.render(cameras.rig.right, narrow.inverse()));
   Playback run(test_config());
-  run.give(first);
+  run.give(first_frame_of_narrow_rig(0.93));
   run.give_drive(1, kFrames);
   double sum = 0.0;
   for (const ScaleRecord& r : run.recorder.scales) sum += r.correction;

@@ -83,8 +83,8 @@ std::string table_row(const SyntheticCase& which, const std::vector<SyntheticRes
   return text + "\n";
 }
 
-nlohmann::ordered_json to_json(const SyntheticCase& which, std::uint64_t seed,
-                               const SyntheticResult& run) {
+nlohmann::ordered_json case_to_json(const SyntheticCase& which, std::uint64_t seed,
+                                    const SyntheticResult& run) {
   nlohmann::ordered_json json;
   json["case"] = name_of(which);
   json["seed"] = seed;
@@ -123,7 +123,7 @@ std::vector<SyntheticResult> run_case(const AppConfig& config, const SyntheticCa
       return {};
     }
     runs.push_back(*result);
-    json->push_back(to_json(which, seed, *result));
+    json->push_back(case_to_json(which, seed, *result));
   }
   return runs;
 }

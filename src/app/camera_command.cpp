@@ -10,6 +10,7 @@
 #include "sovo/app/failure.h"
 #include "sovo/app/frame_input.h"
 #include "sovo/app/progress.h"
+#include "sovo/app/run_outputs.h"
 #include "sovo/app/sim_input.h"
 #include "sovo/app/stop_signal.h"
 #include "sovo/app/vo_follower.h"
@@ -136,6 +137,9 @@ int simulate(AppConfig config, const SimArguments& arguments) {
   }
   if (!arguments.export_to.empty()) return export_sim(config, arguments.export_to, arguments.depth);
   if (arguments.depth) return fail(kUsage, "--depth writes files: give their folder with --export");
+  if (auto writable = check_outputs(config.output); !writable) {
+    return fail(kUsage, writable.error());
+  }
   return publish(config, [&config] { return open_sim_input(config, 1.0, false); });
 }
 

@@ -22,7 +22,7 @@ using bridge::msg::VoCommand;
 using bridge::msg::VoStatus;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::seconds kPatience(5);
+constexpr std::chrono::seconds kAnswerPatience(5);
 
 /// A command without a pose: a reset keeps the last one.
 VoCommand make_command(std::uint8_t what) {
@@ -38,7 +38,7 @@ VoCommand make_command(std::uint8_t what) {
 Result<std::string> wait_for_answer(bridge::Reader<VoStatus>& statuses, std::uint64_t id) {
   const auto begin = Clock::now();
   std::optional<std::string> answer;
-  while (!answer && Clock::now() - begin < kPatience) {
+  while (!answer && Clock::now() - begin < kAnswerPatience) {
     statuses.wait(std::chrono::milliseconds(100));
     const auto taken = statuses.take_each([&](const VoStatus& status, const auto&) {
       if (status.last_command_id != id) return;
@@ -66,7 +66,7 @@ int send(const AppConfig& config, std::uint8_t what) {
 
   const auto begin = Clock::now();
   while (commands->num_readers() == 0 || statuses->num_writers() == 0) {
-    if (Clock::now() - begin > kPatience) {
+    if (Clock::now() - begin > kAnswerPatience) {
       return fail(kFailed, "no sovo vo on " + commands->topic() +
                                "; is it running, in the same domain and namespace?");
     }

@@ -47,6 +47,9 @@ int run(AppConfig config, bool simulated) {
     return fail(kUsage,
                 "no source given; use --dataset FOLDER, or --world NAME for a simulated one");
   }
+  if (simulated && !config.camera.path.empty()) {
+    return fail(kUsage, "two sources given: --dataset (camera.path) and --world; leave one out");
+  }
   if (auto writable = check_outputs(config.output); !writable) {
     return fail(kUsage, writable.error());
   }

@@ -10,7 +10,7 @@
 
 namespace sovo::app {
 
-Result<std::unique_ptr<sim::SimSource>> open_sim_source(const AppConfig& config, double rate) {
+sim::SimConfig sim_options(const AppConfig& config, double rate) {
   sim::SimConfig options = config.sim;
   const CameraSection& camera = config.camera;
   options.calibration = camera.calibration;
@@ -20,13 +20,18 @@ Result<std::unique_ptr<sim::SimSource>> open_sim_source(const AppConfig& config,
   options.reverse = camera.reverse;
   options.restamp = camera.restamp;
   options.frame_id.clear();  // the publisher names it
+  return options;
+}
+
+Result<std::unique_ptr<sim::SimSource>> open_sim_source(const AppConfig& config, double rate) {
+  const sim::SimConfig options = sim_options(config, rate);
   auto source = sim::open_sim(options);
   if (!source) return source;
   const StereoRig& rig = (*source)->rig();
   spdlog::info("simulated {}: {} pairs of {}x{} at {} Hz along {:.1f} m, baseline {:.3f} m",
-               enum_names(options.world)[static_cast<std::size_t>(options.world)].second,
-               (*source)->size().value_or(0), rig.left.width, rig.left.height,
-               (*source)->frame_rate(), (*source)->motion().length_m(), rig.baseline());
+               name_of(options.world), (*source)->size().value_or(0), rig.left.width,
+               rig.left.height, (*source)->frame_rate(), (*source)->motion().length_m(),
+               rig.baseline());
   return source;
 }
 

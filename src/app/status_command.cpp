@@ -24,7 +24,7 @@ using bridge::msg::StereoCalibration;
 using bridge::msg::VoStatus;
 using Clock = std::chrono::steady_clock;
 
-constexpr std::chrono::seconds kPatience(5);
+constexpr std::chrono::seconds kStatusPatience(5);
 
 struct StatusOptions {
   bool once = false;
@@ -45,7 +45,7 @@ void show(const VoStatus& status, const StatusOptions& options) {
 std::string silence_on(const std::string& topic) {
   return fmt::format(
       "nothing on {} for {} s; is sovo vo running, in the same domain and namespace?", topic,
-      kPatience.count());
+      kStatusPatience.count());
 }
 
 /// Every status, or five a second for people.
@@ -58,7 +58,7 @@ int watch(const AppConfig& config, const StatusOptions& options) {
   if (!reader) return fail(kFailed, reader.error());
 
   auto last = Clock::now();
-  auto last_shown = last - kPatience;
+  auto last_shown = last - kStatusPatience;
   while (!stop.requested()) {
     reader->wait(std::chrono::milliseconds(200));
     bool done = false;
@@ -72,7 +72,7 @@ int watch(const AppConfig& config, const StatusOptions& options) {
     });
     if (!taken) return fail(kFailed, taken.error());
     if (done) return kOk;
-    if (Clock::now() - last < kPatience) continue;
+    if (Clock::now() - last < kStatusPatience) continue;
     if (options.once) return fail(kFailed, silence_on(reader->topic()));
     spdlog::warn("{}", silence_on(reader->topic()));
     last = Clock::now();
@@ -145,7 +145,7 @@ int watch_line(const AppConfig& config, const StatusOptions& options) {
   auto last_shown = Clock::now();
   while (!stop.requested()) {
     if (auto done = feed->update(&line); !done) return fail(kFailed, done.error());
-    if (options.once && feed->silence() > kPatience) {
+    if (options.once && feed->silence() > kStatusPatience) {
       return fail(kFailed, silence_on(feed->topic()));
     }
     const auto text = line.text();

@@ -7,6 +7,7 @@
 
 #include "sovo/app/frame_input.h"
 #include "sovo/app/profile_collector.h"
+#include "sovo/app/sim_input.h"
 #include "sovo/driver/sim/sim_source.h"
 #include "sovo/driver/sim/world.h"
 #include "sovo/eval/evaluation.h"
@@ -117,20 +118,15 @@ std::vector<SyntheticCase> all_synthetic_cases() {
 }
 
 std::string name_of(const SyntheticCase& which) {
-  const char* world = enum_names(which.world)[static_cast<std::size_t>(which.world)].second;
-  return std::string(world) + "/" + which.trajectory + (which.reverse ? " <" : "");
+  return std::string(sim::name_of(which.world)) + "/" + which.trajectory +
+         (which.reverse ? " <" : "");
 }
 
 Result<SyntheticResult> run_synthetic(
     const AppConfig& config, const SyntheticCase& which, std::uint64_t seed,
     const std::function<bool(std::size_t, std::size_t)>& progress) {
   const AppConfig c = configured(config, which, seed);
-  sim::SimConfig options = c.sim;
-  options.calibration = c.camera.calibration;
-  options.frames = c.camera.frames;
-  options.start = c.camera.start;
-  options.reverse = c.camera.reverse;
-  auto opened = sim::open_sim(options);
+  auto opened = sim::open_sim(sim_options(c, 0.0));
   if (!opened) return opened.failure();
   sim::SimSource& source = **opened;
   Recording recording;

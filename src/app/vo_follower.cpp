@@ -10,7 +10,7 @@ namespace sovo::app {
 namespace {
 
 constexpr std::uint64_t kMostAhead = 2;
-constexpr std::chrono::seconds kPatience(5);
+constexpr std::chrono::seconds kVoPatience(5);
 constexpr std::chrono::milliseconds kSlice(50);
 
 }  // namespace
@@ -39,7 +39,7 @@ void VoFollower::wait_before(std::uint64_t sequence, const std::function<bool()>
   while (!is_done(sequence - kMostAhead) && !stop()) {
     reader_.wait(kSlice);
     if (update()) last_progress = Clock::now();
-    if (Clock::now() - last_progress < kPatience) continue;
+    if (Clock::now() - last_progress < kVoPatience) continue;
     spdlog::warn("no odometry process answers on {}; publishing without waiting for it",
                  reader_.topic());
     free_running_ = true;

@@ -78,6 +78,11 @@ SE3 rigid_from_matrix(const MatX& matrix, const std::string& where) {
   return {r, Vec3(matrix.topRightCorner(3, 1))};
 }
 
+Vec3 translation_of(const Projection& p) {
+  const double z = p(2, 3);
+  return {(p(0, 3) - p(0, 2) * z) / p(0, 0), (p(1, 3) - p(1, 2) * z) / p(1, 1), z};
+}
+
 void apply_size_options(const CalibrationOptions& options, CameraModel* camera) {
   if (camera->width == 0) camera->width = options.image_width;
   if (camera->height == 0) camera->height = options.image_height;

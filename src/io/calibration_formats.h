@@ -26,6 +26,11 @@ CameraModel make_camera(const CameraFields& fields, const YamlField& where);
 /// A rigid motion from a 3x4 or 4x4 matrix (last row 0 0 0 1); refuses what is not a rotation.
 SE3 rigid_from_matrix(const MatX& matrix, const std::string& where);
 
+using Projection = Eigen::Matrix<double, 3, 4>;
+
+/// t of P = K [I | t]: the reference camera's points in this camera's frame [m].
+Vec3 translation_of(const Projection& p);
+
 /// The image size of the options; zero when they have none.
 void apply_size_options(const CalibrationOptions& options, CameraModel* camera);
 

@@ -10,8 +10,6 @@ namespace sovo::calibration_formats {
 namespace {
 
 namespace fs = std::filesystem;
-using Projection = Eigen::Matrix<double, 3, 4>;
-
 /// The projection matrices P0..P3 that the file has.
 std::map<int, Projection> parse_projections(const std::string& text, const std::string& path) {
   std::map<int, Projection> projections;
@@ -53,12 +51,6 @@ CameraModel camera_of(const Projection& p) {
   camera.cx = p(0, 2);
   camera.cy = p(1, 2);
   return camera;
-}
-
-/// t of P = K [I | t]: camera 0's points in this camera's frame.
-Vec3 translation_of(const Projection& p) {
-  const double z = p(2, 3);
-  return {(p(0, 3) - p(0, 2) * z) / p(0, 0), (p(1, 3) - p(1, 2) * z) / p(1, 1), z};
 }
 
 /// The image size by the first image of a folder, unless it is known already.

@@ -37,12 +37,6 @@ CameraInfo parse_info(const YamlField& root) {
   return info;
 }
 
-/// t of P = K [I | t].
-Vec3 translation_of(const Eigen::Matrix<double, 3, 4>& p) {
-  const double z = p(2, 3);
-  return {(p(0, 3) - p(0, 2) * z) / p(0, 0), (p(1, 3) - p(1, 2) * z) / p(1, 1), z};
-}
-
 /// Path with the last "from" in the file's name replaced; empty when it has none.
 std::string replaced(const std::string& path, const std::string& from, const std::string& to) {
   const std::filesystem::path file(path);

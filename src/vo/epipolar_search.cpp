@@ -11,7 +11,7 @@ namespace sovo {
 
 namespace {
 
-constexpr float kBorder = 4.0F;
+constexpr float kSearchBorder = 4.0F;
 constexpr int kMaxSteps = 100;
 constexpr int kRefinements = 3;
 constexpr float kMaxRefinement = 0.5F;   // px an iteration
@@ -21,11 +21,13 @@ constexpr float kMaxPixelError = 10.0F;
 constexpr float kPixelErrorBase = 0.2F;
 constexpr float kMinDepthRatio = 0.75F;
 constexpr float kMaxDepthRatio = 1.5F;
-constexpr float kMaxPatternOffset = 2.9F;  // px; within kBorder with the pixels for the gradient
+// [px]; within the border together with the pixels for the gradient.
+constexpr float kMaxPatternOffset = 2.9F;
 
 bool inside(const ImageF& image, float u, float v) {
-  return u > kBorder && v > kBorder && u < static_cast<float>(image.width()) - kBorder - 1.0F &&
-         v < static_cast<float>(image.height()) - kBorder - 1.0F;
+  return u > kSearchBorder && v > kSearchBorder &&
+         u < static_cast<float>(image.width()) - kSearchBorder - 1.0F &&
+         v < static_cast<float>(image.height()) - kSearchBorder - 1.0F;
 }
 
 /// The segment of the image on which the point must lie, and what is needed to come back from a

@@ -101,8 +101,6 @@ void PhotometricProblem::linearize_block(const Block& block, const WindowLineari
                                          HostSums* sums, double* energy) const {
   std::array<PatternProjection, kAhead * kMaxSlots> projections;
   std::array<TargetResidual, kMaxSlots> residuals;
-  std::vector<Vec8> shifts;
-  if (request.at_frozen_poses) shifts = relative_displacements(*window_, window_->stacked_x());
   const auto wanted = [&](std::size_t k) {
     return (request.targets >> known.residuals[k].target & 1U) != 0;
   };
@@ -132,7 +130,7 @@ void PhotometricProblem::linearize_block(const Block& block, const WindowLineari
                                 known_residual(known.residuals[k]), *projection++, &r.linearized);
         if (r.linearized.state == ResidualState::kIn) {
           if (request.at_frozen_poses) {
-            shift_residual(shifts[pair_index(block.host, r.target)], &r.linearized);
+            shift_residual(shifts_[pair_index(block.host, r.target)], &r.linearized);
           }
           accumulate_depth(r.linearized, &depth.hessian, &depth.gradient);
         }
@@ -150,6 +148,7 @@ void PhotometricProblem::linearize(const WindowLinearization& known, const Reque
                                    WindowLinearization* out) {
   if (out->residuals.size() != known.residuals.size()) *out = known;
   std::vector<double> energies(blocks_.size());
+  if (request.at_frozen_poses) shifts_ = relative_displacements(*window_, window_->stacked_x());
   pool_->run(static_cast<int>(blocks_.size()), [&](int i) {
     const auto k = static_cast<std::size_t>(i);
     linearize_block(blocks_[k], known, request, out, &sums_[k], &energies[k]);

@@ -95,6 +95,7 @@ class PhotometricProblem {
   std::vector<std::size_t> first_;  ///< First residual of each point, and one past the last.
   std::vector<Block> blocks_;
   std::vector<HostSums> sums_;  ///< Of each block.
+  std::vector<Vec8> shifts_;  ///< From the frozen poses to the current ones, for `at_frozen_poses`.
 };
 
 /// Relative displacement of each pair for a displacement of all keyframes (8 a keyframe): J x of a

@@ -9,7 +9,7 @@ namespace sovo {
 namespace {
 
 constexpr int kIterations = 3;
-constexpr double kStartLambda = 0.1;
+constexpr double kDepthStartLambda = 0.1;
 constexpr double kStopStep = 1e-4;         // relative
 constexpr double kMinInformation = 100.0;  // H_rho_rho * mean_rho^2
 constexpr int kCandidateBlock = 32;
@@ -173,7 +173,7 @@ void PointActivator::optimize(const Window& window, double mean_rho, Candidate* 
   DepthEvaluation now;
   evaluate(window, *candidate, p, 1e3, &now);
   const double unit = mean_rho * mean_rho;
-  double lambda = kStartLambda;
+  double lambda = kDepthStartLambda;
   if (now.hessian * unit < kMinInformation) return;  // stays immature
   double best_rho = p.rho;
   evaluate(window, *candidate, p, 1.0, &now);

@@ -89,6 +89,10 @@ class SimulatedRefusals(SimTest):
         self.refused(USAGE, ["--export"], "camera", "sim", "--depth")
         self.refused(USAGE, ["fast", "Hz"], "camera", "sim", "--rate", "fast")
         self.refused(USAGE, ["--dataset", "--world"], "run")
+        self.refused(USAGE, ["--dataset", "--world", "leave one out"], "run", "--world", "lawn",
+                     "--dataset", self.folder)
+        self.refused(USAGE, ["/nowhere does not exist"], "camera", "sim", *self.world("lawn"),
+                     "--truth", "/nowhere/truth.txt")
         self.refused(BAD_INPUT, ["/nowhere.txt", "town", "expressway"], "run", "--world", "street",
                      "--trajectory", "/nowhere.txt")
         self.refused(BAD_INPUT, ["no pair 100000"], "run", "--world", "hall", "--start", 100000)

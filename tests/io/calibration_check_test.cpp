@@ -11,7 +11,7 @@
 namespace sovo {
 namespace {
 
-StereoRig some_rig() {
+StereoRig checked_rig() {
   StereoRig rig;
   rig.left = test::make_camera(320, 240, 200.0, 201.0, 158.0, 121.0, Distortion::kRadtan,
                                {-0.2, 0.05, 1e-4, -1e-4});
@@ -30,9 +30,9 @@ std::vector<ImagePair> render(const StereoRig& rig) {
   return pairs;
 }
 
-/// The views of `some_rig`.
+/// The views of `checked_rig`.
 const std::vector<ImagePair>& views() {
-  static const std::vector<ImagePair> pairs = render(some_rig());
+  static const std::vector<ImagePair> pairs = render(checked_rig());
   return pairs;
 }
 
@@ -50,7 +50,7 @@ std::string text_of(const CalibrationReport& report) {
 }
 
 TEST(CalibrationCheck, GoodCalibrationHasNoFindings) {
-  const auto report = check_calibration_on_images(some_rig(), views());
+  const auto report = check_calibration_on_images(checked_rig(), views());
   EXPECT_TRUE(report.findings.empty()) << text_of(report);
   EXPECT_GT(report.matches, report.points / 2) << text_of(report);
   EXPECT_GT(report.median_depth, 1.0);
@@ -61,18 +61,18 @@ TEST(CalibrationCheck, GoodCalibrationHasNoFindings) {
 TEST(CalibrationCheck, NamesExchangedImages) {
   auto pairs = views();
   std::swap(pairs[0].left, pairs[0].right);
-  const auto report = check_calibration_on_images(some_rig(), pairs);
+  const auto report = check_calibration_on_images(checked_rig(), pairs);
   EXPECT_TRUE(has(report, CalibrationFault::kSwapped)) << text_of(report);
 }
 
 TEST(CalibrationCheck, NamesMillimetres) {
-  StereoRig rig = some_rig();
+  StereoRig rig = checked_rig();
   rig.T_right_left.translation() *= 1000.0;
   auto report = check_calibration_on_images(rig, views());
   EXPECT_TRUE(has(report, CalibrationFault::kInvalid)) << text_of(report);
   EXPECT_TRUE(contains(text_of(report), "millimetres"));
   // A baseline of a few millimetres is still possible as metres: the depths tell.
-  StereoRig small = some_rig();
+  StereoRig small = checked_rig();
   small.T_right_left.translation() *= 0.05;
   const auto pairs = render(small);
   rig.T_right_left.translation() = small.T_right_left.translation() * 1000.0;
@@ -83,7 +83,7 @@ TEST(CalibrationCheck, NamesMillimetres) {
 TEST(CalibrationCheck, NamesSmallAndLargeDecalibration) {
   const auto pairs = views();
   for (const double offset_px : {-2.0, 2.5, 12.0, -20.0}) {
-    StereoRig rig = some_rig();
+    StereoRig rig = checked_rig();
     const SE3 turn(SO3::exp(Vec3(offset_px / rig.right.fy, 0.0, 0.0)), Vec3::Zero());
     rig.T_right_left = turn * rig.T_right_left;
     const auto report = check_calibration_on_images(rig, pairs);
@@ -95,12 +95,12 @@ TEST(CalibrationCheck, NamesSmallAndLargeDecalibration) {
 TEST(CalibrationCheck, NamesImagesThatCannotBeUsed) {
   auto pairs = views();
   pairs[0].right.fill(30.0F);
-  EXPECT_TRUE(has(check_calibration_on_images(some_rig(), pairs), CalibrationFault::kUnmatched));
+  EXPECT_TRUE(has(check_calibration_on_images(checked_rig(), pairs), CalibrationFault::kUnmatched));
   pairs[0].left.fill(0.0F);
   EXPECT_TRUE(
-      has(check_calibration_on_images(some_rig(), pairs), CalibrationFault::kLittleTexture));
+      has(check_calibration_on_images(checked_rig(), pairs), CalibrationFault::kLittleTexture));
   pairs[0].left.resize(100, 100);
-  EXPECT_TRUE(has(check_calibration_on_images(some_rig(), pairs), CalibrationFault::kImageSize));
+  EXPECT_TRUE(has(check_calibration_on_images(checked_rig(), pairs), CalibrationFault::kImageSize));
 }
 
 ImageF float_image(const std::string& path) {

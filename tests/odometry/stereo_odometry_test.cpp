@@ -11,7 +11,7 @@ namespace {
 
 using namespace test;
 
-constexpr int kFrames = 24;
+constexpr int kDriveFrames = 24;
 
 void expect_follows_the_drive(const std::vector<TrajectoryPose>& trajectory, double rms,
                               double scale) {
@@ -26,7 +26,7 @@ void expect_follows_the_drive(const std::vector<TrajectoryPose>& trajectory, dou
 
 TEST(StereoOdometry, FollowsADriveInMetres) {
   Playback run(test_config());
-  run.give_drive(0, kFrames);
+  run.give_drive(0, kDriveFrames);
   run.odometry.finish();
   for (const OdometryOutput& o : run.recorder.frames) {
     EXPECT_TRUE(o.pose_valid);
@@ -37,18 +37,18 @@ TEST(StereoOdometry, FollowsADriveInMetres) {
     EXPECT_EQ(o.session, 7U);
   }
   const OdometryOutput& last = run.recorder.frames.back();
-  EXPECT_EQ(last.received, static_cast<std::uint64_t>(kFrames));
+  EXPECT_EQ(last.received, static_cast<std::uint64_t>(kDriveFrames));
   EXPECT_EQ(last.rejected, 0U);
   EXPECT_EQ(last.dropped_queue, 0U);
   EXPECT_GT(last.points, 200U);
   EXPECT_GT(last.keyframes, 2U);
-  const Vec3 motion = drive(kFrames - 1).translation() - drive(kFrames - 2).translation();
+  const Vec3 motion = drive(kDriveFrames - 1).translation() - drive(kDriveFrames - 2).translation();
   EXPECT_NEAR(last.velocity.head<3>().norm(), motion.norm() / (1e-9 * kPeriodNs), 0.15);
   EXPECT_GT(last.pose_covariance.diagonal().minCoeff(), 0.0);
 
   expect_follows_the_drive(published(run.recorder), 0.015, 0.03);
   const auto refined = run.odometry.refined_trajectory();
-  EXPECT_EQ(refined.size(), static_cast<std::size_t>(kFrames));
+  EXPECT_EQ(refined.size(), static_cast<std::size_t>(kDriveFrames));
   expect_follows_the_drive(refined, 0.015, 0.03);
   EXPECT_LT(refined[0].T_odom_left.log().norm(), 2e-3);
   EXPECT_TRUE(run.recorder.frames[0].T_odom_left.matrix().isIdentity(1e-12));
@@ -88,11 +88,11 @@ TEST(StereoOdometry, LiveThreadsFollowTheDriveToo) {
   config.threads = 2;
   config.wait_for_mapping = true;
   Playback run(config);
-  run.give_drive(0, kFrames);
+  run.give_drive(0, kDriveFrames);
   run.odometry.finish();
   EXPECT_EQ(run.recorder.frames.back().dropped_queue, 0U);
   expect_follows_the_drive(published(run.recorder), 0.02, 0.04);
-  EXPECT_EQ(run.odometry.refined_trajectory().size(), static_cast<std::size_t>(kFrames));
+  EXPECT_EQ(run.odometry.refined_trajectory().size(), static_cast<std::size_t>(kDriveFrames));
   expect_follows_the_drive(run.odometry.refined_trajectory(), 0.02, 0.04);
   EXPECT_GE(run.recorder.keyframes.size(), 3U);
   // A scale job that is overtaken by the next keyframe is left out.
@@ -118,7 +118,8 @@ TEST(StereoOdometry, TwoViewStartFindsItsScale) {
   StereoOdometryConfig config = test_config();
   config.init = InitMethod::kTwoView;
   Playback run(config);
-  for (int i = 0; i < 2 * kFrames && run.recorder.scales.size() < 4; ++i) run.give(drive_frame(i));
+  for (int i = 0; i < 2 * kDriveFrames && run.recorder.scales.size() < 4; ++i)
+    run.give(drive_frame(i));
   const auto& frames = run.recorder.frames;
   EXPECT_EQ(frames[0].state, OdometryState::kInitializing);
   EXPECT_FALSE(frames[0].pose_valid);
@@ -135,14 +136,15 @@ TEST(StereoOdometry, TwoViewStartFindsItsScale) {
 TEST(StereoOdometry, WrongScaleAtTheStartIsCorrected) {
   Playback run(test_config());
   run.give(first_frame_of_narrow_rig(0.93));
-  run.give_drive(1, kFrames);
+  run.give_drive(1, kDriveFrames);
   double sum = 0.0;
   for (const ScaleRecord& r : run.recorder.scales) sum += r.correction;
   // Depths came out 1 / 0.93 too long.
   EXPECT_NEAR(sum, std::log(0.93), 0.03);
   EXPECT_NEAR(run.recorder.frames.back().log_scale, sum, 0.005);
   const auto trajectory = run.odometry.refined_trajectory();
-  const std::vector<TrajectoryPose> second_half(trajectory.begin() + kFrames / 2, trajectory.end());
+  const std::vector<TrajectoryPose> second_half(trajectory.begin() + kDriveFrames / 2,
+                                                trajectory.end());
   EXPECT_NEAR(drive_error(second_half).scale, 1.0, 0.04);
 }
 

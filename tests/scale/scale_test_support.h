@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "sovo/scale/scale_optimizer.h"
+#include "support/pyramids.h"
 #include "support/synthetic_scene.h"
 
 namespace sovo::test {
@@ -52,11 +53,6 @@ struct StereoView {
   StereoRig rig;
   ImageF left, right;
 };
-
-inline ImagePyramidPtr pyramid_of(ImageF image) {
-  const int levels = ImagePyramid::num_levels_for(image.width(), image.height());
-  return std::make_shared<const ImagePyramid>(std::move(image), levels);
-}
 
 /// Renders; `render` keeps what it has rendered for the life of the program.
 inline StereoView render_view(const SyntheticScene& scene, const StereoRig& rig) {

@@ -32,7 +32,7 @@ ImageF textured(int width, int height, std::uint32_t seed = 5) {
   return out;
 }
 
-ImagePyramid pyramid_of(ImageF image) {
+ImagePyramid plain_pyramid(ImageF image) {
   const int levels = ImagePyramid::num_levels_for(image.width(), image.height());
   return {std::move(image), levels};
 }
@@ -56,7 +56,7 @@ class PixelSelectorSizes : public testing::TestWithParam<std::pair<int, int>> {}
 
 TEST_P(PixelSelectorSizes, CountBorderUniquenessAndSpread) {
   const auto [width, height] = GetParam();
-  const ImagePyramid pyramid = pyramid_of(textured(width, height));
+  const ImagePyramid pyramid = plain_pyramid(textured(width, height));
   PixelSelector selector;
   const int wanted = 1000;
   const auto pixels = select(&selector, pyramid, wanted);
@@ -86,7 +86,7 @@ INSTANTIATE_TEST_SUITE_P(Sizes, PixelSelectorSizes,
                                          std::pair{333, 251}));
 
 TEST(PixelSelector, DensityFollowsTheWantedNumber) {
-  const ImagePyramid pyramid = pyramid_of(textured(640, 480));
+  const ImagePyramid pyramid = plain_pyramid(textured(640, 480));
   PixelSelector selector;
   for (const int wanted : {200, 4000, 600, 2000, 50, 1500}) {
     const auto pixels = select(&selector, pyramid, wanted);
@@ -96,7 +96,7 @@ TEST(PixelSelector, DensityFollowsTheWantedNumber) {
 }
 
 TEST(PixelSelector, ReportsTheGradientOfItsPixels) {
-  const ImagePyramid pyramid = pyramid_of(textured(320, 240));
+  const ImagePyramid pyramid = plain_pyramid(textured(320, 240));
   PixelSelector selector;
   for (const SelectedPixel& p : select(&selector, pyramid, 500)) {
     const ImageF& image = pyramid[0];
@@ -110,7 +110,7 @@ TEST(PixelSelector, ReportsTheGradientOfItsPixels) {
 }
 
 TEST(PixelSelector, MaskKeepsItsDistance) {
-  const ImagePyramid pyramid = pyramid_of(textured(641, 479));
+  const ImagePyramid pyramid = plain_pyramid(textured(641, 479));
   ImageU8 mask(641, 479);
   mask.fill(255);
   const auto masked = [](int x, int y) {
@@ -135,13 +135,13 @@ TEST(PixelSelector, WeakTextureGivesFewPixelsAndNoneWithoutAny) {
   ImageF flat(640, 480);
   flat.fill(90.0F);
   PixelSelector selector;
-  EXPECT_TRUE(select(&selector, pyramid_of(flat), 1000).empty());
+  EXPECT_TRUE(select(&selector, plain_pyramid(flat), 1000).empty());
 
   ImageF edge = flat;
   for (int y = 0; y < 480; ++y) {
     for (int x = 320; x < 640; ++x) edge.at(x, y) = 160.0F;
   }
-  const auto pixels = select(&selector, pyramid_of(edge), 1000);
+  const auto pixels = select(&selector, plain_pyramid(edge), 1000);
   EXPECT_GE(pixels.size(), 100U);
   for (const SelectedPixel& p : pixels) EXPECT_NEAR(p.x, 319.5, 4.0);
 }
@@ -159,14 +159,14 @@ TEST(PixelSelector, CoarseBlocksTakeOverWhereTheFineLevelIsWeak) {
     }
   }
   PixelSelector selector;
-  const auto pixels = select(&selector, pyramid_of(image), 1000);
+  const auto pixels = select(&selector, plain_pyramid(image), 1000);
   EXPECT_GE(pixels.size(), 500U);
   for (const SelectedPixel& p : pixels) EXPECT_GE(p.type, 2);
 }
 
 TEST(PixelSelector, SameHistoryGivesTheSamePixels) {
-  const ImagePyramid first = pyramid_of(textured(640, 480, 1));
-  const ImagePyramid second = pyramid_of(textured(640, 480, 2));
+  const ImagePyramid first = plain_pyramid(textured(640, 480, 1));
+  const ImagePyramid second = plain_pyramid(textured(640, 480, 2));
   PixelSelector a, b;
   const auto a1 = select(&a, first, 1000);
   const auto a2 = select(&a, second, 1000);
@@ -183,8 +183,8 @@ TEST(PixelSelector, SameHistoryGivesTheSamePixels) {
 
 TEST(PixelSelector, TinyImages) {
   PixelSelector selector;
-  EXPECT_TRUE(select(&selector, pyramid_of(textured(5, 5)), 100).empty());
-  EXPECT_FALSE(select(&selector, pyramid_of(textured(24, 24)), 100).empty());
+  EXPECT_TRUE(select(&selector, plain_pyramid(textured(5, 5)), 100).empty());
+  EXPECT_FALSE(select(&selector, plain_pyramid(textured(24, 24)), 100).empty());
 }
 
 }  // namespace

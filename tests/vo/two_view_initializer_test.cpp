@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "support/pyramids.h"
 #include "support/synthetic_scene.h"
 
 namespace sovo {
@@ -23,11 +24,6 @@ CameraModel test_camera() {
   camera.cx = 241.0;
   camera.cy = 178.0;
   return camera;
-}
-
-ImagePyramidPtr pyramid_of(ImageF image) {
-  const int levels = ImagePyramid::num_levels_for(image.width(), image.height());
-  return std::make_shared<ImagePyramid>(std::move(image), levels);
 }
 
 double angle_between(const Vec3& a, const Vec3& b) {
@@ -57,7 +53,7 @@ Outcome feed(const test::SyntheticScene& scene, const Motion& T_world_camera, in
       ImageF image = scene.render(camera, T_world_camera(i));
       test::apply_brightness(1.0 - gain_step * i, 2.0 * gain_step * i, &image);
       test::add_noise(1.5, static_cast<unsigned>(i), &image);
-      pyramid = pyramid_of(std::move(image));
+      pyramid = test::pyramid_of(std::move(image));
       if (rendered != nullptr) rendered->push_back(pyramid);
     }
     if (i == 0) {
@@ -134,14 +130,14 @@ TEST(TwoViewInitializer, RefusesAFrameWithoutTextureAndGivesUpWhenLost) {
   flat.fill(100.0F);
   TwoViewInitializer initializer;
   PixelSelector selector;
-  EXPECT_FALSE(initializer.set_first(0, pyramid_of(flat), test_camera(), nullptr, &selector));
+  EXPECT_FALSE(initializer.set_first(0, test::pyramid_of(flat), test_camera(), nullptr, &selector));
 
   const test::SyntheticScene scene(6);
-  const auto first = pyramid_of(scene.render(test_camera(), SE3()));
+  const auto first = test::pyramid_of(scene.render(test_camera(), SE3()));
   ASSERT_TRUE(initializer.set_first(0, first, test_camera(), nullptr, &selector));
   auto status = TwoViewInitializer::Status::kNotYet;
   for (int i = 1; i <= 10 && status == TwoViewInitializer::Status::kNotYet; ++i) {
-    status = initializer.track(i, pyramid_of(flat));
+    status = initializer.track(i, test::pyramid_of(flat));
   }
   EXPECT_EQ(status, TwoViewInitializer::Status::kFailed);
 }
@@ -281,9 +277,9 @@ TEST(PatchTracker, FollowsAShiftOfSeveralPixelsWithAChangeOfContrast) {
     }
   }
   PatchTracker tracker;
-  tracker.set_first(*pyramid_of(image), camera, candidates);
+  tracker.set_first(*test::pyramid_of(image), camera, candidates);
   ASSERT_GE(tracker.tracks().size(), 50U);
-  const auto next = pyramid_of(shifted);
+  const auto next = test::pyramid_of(shifted);
   tracker.track(*next, SO3(), SO3());
   int right = 0;
   for (const PatchTrack& t : tracker.tracks()) {

@@ -11,7 +11,7 @@ namespace {
 
 using namespace test;
 
-constexpr int kKeyframes = 5;
+constexpr int kGaugeKeyframes = 5;
 
 WindowConfig without_priors() {
   WindowConfig config;
@@ -25,7 +25,7 @@ class WindowGauge : public ::testing::Test {
   WindowGauge()
       : pool_(1),
         adjuster_(without_priors(), &pool_),
-        window_(scene_window(kKeyframes, 6, 1)),
+        window_(scene_window(kGaugeKeyframes, 6, 1)),
         problem_(without_priors(), collect_points(&window_), &window_, &pool_) {}
 
   NormalEquations linearized_system() {

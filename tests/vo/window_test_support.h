@@ -12,17 +12,13 @@
 #include "sovo/vo/photometric_problem.h"
 #include "sovo/vo/window.h"
 #include "support/cameras.h"
+#include "support/pyramids.h"
 #include "support/synthetic_scene.h"
 
 namespace sovo::test {
 
 /// Small enough to be rendered in milliseconds.
 inline CameraModel small_camera() { return make_camera(208, 156, 170, 171, 103.2, 78.6); }
-
-inline ImagePyramidPtr pyramid_of(ImageF image) {
-  const int levels = ImagePyramid::num_levels_for(image.width(), image.height());
-  return std::make_shared<const ImagePyramid>(std::move(image), levels);
-}
 
 /// Grey levels as a function of the pixel, with all derivatives: long waves only, so that the
 /// interpolation of the sampled image is exact to 1e-4.

@@ -10,7 +10,7 @@ namespace {
 
 using Eigen::Vector3f;
 
-constexpr float kVisible = 0.5F;  // [px]; less takes a few hundredths of the finest detail
+constexpr float kVisibleBlur = 0.5F;  // [px]; less takes a few hundredths of the finest detail
 constexpr int kMostTaps = 33;
 
 using TileFloats = std::array<float, RayTable::kTilePixels>;
@@ -49,7 +49,7 @@ SOVO_SIM_KERNEL void find_flow(const RayTable& rays, int tile, const Vector3f& s
     const float length = std::min(static_cast<float>(kMostTaps - 1), std::sqrt(x * x + y * y));
     const int whole = static_cast<int>(length);
     const int wanted = 1 + whole + (static_cast<float>(whole) < length ? 1 : 0);
-    const int taps = length > kVisible ? wanted : 1;
+    const int taps = length > kVisibleBlur ? wanted : 1;
     flow->x[i] = x;
     flow->y[i] = y;
     flow->taps[i] = taps;

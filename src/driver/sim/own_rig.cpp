@@ -26,7 +26,7 @@ CameraModel camera(double f, Distortion distortion, std::array<double, 4> d, dou
 
 StereoRig own_rig(World world) {
   StereoRig rig;
-  rig.name = "sim_" + std::string(enum_names(world)[static_cast<std::size_t>(world)].second);
+  rig.name = "sim_" + std::string(name_of(world));
   const auto place_right = [&rig](double baseline, const Vec3& turn) {
     rig.T_right_left = SE3(SO3::exp(turn), Vec3(-baseline, 0.0, 0.0));
   };

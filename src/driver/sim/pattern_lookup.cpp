@@ -7,11 +7,9 @@
 namespace sovo::sim {
 namespace {
 
-/// Patterns are looked up a little softer than pixels are, as a lens does.
-constexpr float kLevelBias = 0.25F;
 /// Places relative to the foot are held in steps of 2^-20 of a pattern's side; those further away
 /// than this are seen so small that only the mean is left.
-constexpr float kSteps = 1048576.0F;
+constexpr float kFractionSteps = 1048576.0F;
 constexpr float kFarthest = 2047.0F;
 
 /// Where and how finely the pattern is looked up.
@@ -37,7 +35,7 @@ struct FlatMap {
 
 inline std::uint32_t to_place(float sides) {
   const float within = std::min(kFarthest, std::max(-kFarthest, sides));
-  return static_cast<std::uint32_t>(static_cast<std::int32_t>(within * kSteps)) << 12;
+  return static_cast<std::uint32_t>(static_cast<std::int32_t>(within * kFractionSteps)) << 12;
 }
 
 SOVO_SIM_KERNEL void place(const FlatMap& map, const SpotPlaces& places, const Spots& spots,

@@ -7,6 +7,9 @@
 
 namespace sovo::sim {
 
+/// Patterns are looked up a little softer than pixels are, as a lens does [levels].
+inline constexpr float kLevelBias = 0.25F;
+
 /// Coordinates of a batch of spots: on their surface or in the world [m].
 struct SpotPlaces {
   double foot_x = 0.0, foot_y = 0.0;  ///< x and y count from here.

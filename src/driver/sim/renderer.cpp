@@ -9,7 +9,6 @@
 namespace sovo::sim {
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr int kNothing = TileSamples::kNothing;
 
 /// Eight places in a pixel, no two in one row or column.

@@ -9,7 +9,6 @@
 namespace sovo::sim {
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kNear = 0.02F;  ///< Nothing nearer is seen [m].
 
 void store(const Vec3& from, float* to) {

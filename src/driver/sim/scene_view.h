@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "sovo/driver/sim/ray_table.h"
@@ -7,6 +8,9 @@
 #include "sovo/geometry/se3.h"
 
 namespace sovo::sim {
+
+/// Range of a ray that meets nothing.
+inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 /// A surface as a camera has it before it: vectors are of the camera's frame, lengths in metres.
 struct SurfaceView {

@@ -8,7 +8,7 @@
 namespace sovo::sim {
 namespace {
 
-constexpr int kSteps = 4096;
+constexpr int kResponseSteps = 4096;
 
 /// Sums of bytes of random bits come near enough to a Gaussian of deviation 1.
 float gaussian(std::uint64_t bits) {
@@ -65,10 +65,10 @@ Sensor::Sensor(const SensorConfig& config, int width, int height) : config_(conf
       vignette_.at(x, y) = static_cast<float>(1.0 - config.vignette * r2);
     }
   }
-  response_.resize(kSteps + 1);
-  for (int i = 0; i <= kSteps; ++i) {
+  response_.resize(kResponseSteps + 1);
+  for (int i = 0; i <= kResponseSteps; ++i) {
     const double grey =
-        255.0 * std::pow(static_cast<double>(i) / kSteps, 1.0 / config.response_gamma);
+        255.0 * std::pow(static_cast<double>(i) / kResponseSteps, 1.0 / config.response_gamma);
     response_[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>(std::lround(grey));
   }
 }
@@ -84,7 +84,7 @@ std::vector<std::uint8_t> Sensor::expose(const ImageF& light, const ExposureCont
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     const float clean = light.data()[i] * vignette_.data()[i] * sensitivity;
     const float noise = gaussian(scramble(seed + i)) * std::sqrt(read + shot * clean);
-    const float level = std::clamp(clean + noise, 0.0F, 1.0F) * static_cast<float>(kSteps);
+    const float level = std::clamp(clean + noise, 0.0F, 1.0F) * static_cast<float>(kResponseSteps);
     pixels[i] = response_[static_cast<std::size_t>(level + 0.5F)];
   }
   return pixels;

@@ -11,9 +11,6 @@ namespace sovo::sim {
 
 namespace {
 
-/// The sky's patterns are looked up a little softer than pixels are, as a lens does.
-constexpr float kLevelBias = 0.25F;
-
 /// exp(-x) for x >= 0, to a millionth; the same on every machine.
 inline float exp_of_minus(float x) {
   const float power = std::max(-126.0F, -1.44269504F * x);

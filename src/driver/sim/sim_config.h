@@ -32,6 +32,9 @@ constexpr std::array<std::pair<World, const char*>, 4> enum_names(World) {
            {World::kStreet, "street"},
            {World::kHall, "hall"}}};
 }
+constexpr const char* name_of(World world) {
+  return enum_names(world)[static_cast<std::size_t>(world)].second;
+}
 constexpr std::array<std::pair<Side, const char*>, 3> enum_names(Side) {
   return {{{Side::kNone, "none"}, {Side::kLeft, "left"}, {Side::kRight, "right"}}};
 }

@@ -7,8 +7,8 @@
 namespace sovo::sim {
 namespace {
 
-constexpr int kEnd = -1;           ///< Of a chain.
-constexpr float kVisible = 0.02F;  ///< Light that comes through less than this is left out.
+constexpr int kEnd = -1;                ///< Of a chain.
+constexpr float kVisibleLight = 0.02F;  ///< Light that comes through less than this is left out.
 
 }  // namespace
 
@@ -113,7 +113,7 @@ void TileSamples::add_cut(int sample, const Cut& cut) {
 void TileSamples::compose() {
   for (std::size_t i = 0; i < at(count_); ++i) {
     float left = 1.0F;
-    for (int k = first_cut_[i]; k != kEnd && left > kVisible; k = cuts_[at(k)].next) {
+    for (int k = first_cut_[i]; k != kEnd && left > kVisibleLight; k = cuts_[at(k)].next) {
       const Cut& cut = cuts_[at(k)];
       light_[i] += left * cut.opacity * cut.light;
       left *= 1.0F - cut.opacity;
@@ -127,7 +127,7 @@ void TileSamples::shade_solid(const SceneView& view, const Shader& shader) {
   first_of_surface_.resize(view.views().size() + 1, kEnd);
   met_.clear();
   for (int i = count_ - 1; i >= 0; --i) {
-    if (share_[at(i)] <= 0.0F || left_[at(i)] <= kVisible) continue;
+    if (share_[at(i)] <= 0.0F || left_[at(i)] <= kVisibleLight) continue;
     int& first = first_of_surface_[at(surface_[at(i)] + 1)];
     if (first == kEnd) met_.push_back(surface_[at(i)]);
     next_of_surface_[at(i)] = first;

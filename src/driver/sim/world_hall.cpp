@@ -10,8 +10,6 @@
 namespace sovo::sim {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 struct HallMaterials {
   int concrete, wall, ceiling, pipe, yellow, shadow;
   std::vector<int> machines;
@@ -19,7 +17,7 @@ struct HallMaterials {
   std::vector<int> posters;
 };
 
-HallMaterials make_materials(SceneBuilder& b, std::uint64_t seed) {
+HallMaterials hall_materials(SceneBuilder& b, std::uint64_t seed) {
   HallMaterials m;
   const int concrete = b.texture(concrete_pattern(512, seed));
   const int noise = b.texture(noise_pattern(512, 4, 8, 0.75F, seed + 1));
@@ -77,9 +75,9 @@ void add_shell(SceneBuilder& b, const HallMaterials& m, const Room& r) {
   b.floor(middle, 0.0, length, width, m.concrete);
   b.quad(middle + r.height * Vec3::UnitZ(), Vec3::UnitY(), Vec3::UnitX(), width, length, m.ceiling);
   b.wall({r.x0, middle.y(), 0.0}, 0.0, width, r.height, m.wall);
-  b.wall({r.x1, middle.y(), 0.0}, kPi, width, r.height, m.wall);
-  b.wall({middle.x(), r.y0, 0.0}, 0.5 * kPi, length, r.height, m.wall);
-  b.wall({middle.x(), r.y1, 0.0}, -0.5 * kPi, length, r.height, m.wall);
+  b.wall({r.x1, middle.y(), 0.0}, std::numbers::pi, width, r.height, m.wall);
+  b.wall({middle.x(), r.y0, 0.0}, 0.5 * std::numbers::pi, length, r.height, m.wall);
+  b.wall({middle.x(), r.y1, 0.0}, -0.5 * std::numbers::pi, length, r.height, m.wall);
   for (const double y : {middle.y() - 0.27 * width, middle.y() + 0.27 * width}) {
     b.floor({middle.x(), y, 0.004}, 0.0, length, 0.12, m.yellow);
   }
@@ -112,12 +110,13 @@ void add_structure(SceneBuilder& b, const HallMaterials& m, const Room& r, const
     if (along_x) {
       const bool left = random.chance(0.5);
       const double x = random.uniform(r.x0 + 2.0, r.x1 - 2.0);
-      b.wall({x, left ? r.y1 - out : r.y0 + out, z}, left ? -0.5 * kPi : 0.5 * kPi, wide, high,
-             poster);
+      b.wall({x, left ? r.y1 - out : r.y0 + out, z},
+             left ? -0.5 * std::numbers::pi : 0.5 * std::numbers::pi, wide, high, poster);
     } else {
       const bool far = random.chance(0.5);
       const double y = random.uniform(r.y0 + 2.0, r.y1 - 2.0);
-      b.wall({far ? r.x1 - out : r.x0 + out, y, z}, far ? kPi : 0.0, wide, high, poster);
+      b.wall({far ? r.x1 - out : r.x0 + out, y, z}, far ? std::numbers::pi : 0.0, wide, high,
+             poster);
     }
   }
   for (int i = 0; i < 40; ++i) {  // free columns and tanks, some of them near the way
@@ -137,7 +136,8 @@ void add_machines(SceneBuilder& b, const HallMaterials& m, const Room& r, const 
     const double x = random.uniform(r.x0 + 1.5, r.x1 - 1.5);
     const double y = random.uniform(r.y0 + 1.5, r.y1 - 1.5);
     const bool crate = random.chance(0.5);
-    const double yaw = crate ? random.uniform(0.0, kPi) : 0.5 * kPi * random.below(2);
+    const double yaw =
+        crate ? random.uniform(0.0, std::numbers::pi) : 0.5 * std::numbers::pi * random.below(2);
     const double side = random.uniform(0.5, 1.1);
     const Vec3 size =
         crate ? Vec3(side, side, side)
@@ -167,7 +167,7 @@ Scene build_hall(const Motion& motion, std::uint64_t seed) {
   b.scene().ambient = 0.6F;
   b.scene().sun = 0.35F;
   b.scene().exposure_s = 0.008;
-  const HallMaterials m = make_materials(b, combine(seed, 31));
+  const HallMaterials m = hall_materials(b, combine(seed, 31));
   const Footprint way(motion);
   const Room room{way.low().x() - 4.0, way.high().x() + 4.0, way.low().y() - 3.5,
                   way.high().y() + 3.5, std::max(5.0, way.high().z() + 2.0)};

@@ -11,8 +11,6 @@
 namespace sovo::sim {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
-
 /// Daisies, clover leaves and dry leaves, far between.
 ImageF flower_pattern(int size, std::uint64_t seed) {
   Random random(seed);
@@ -22,7 +20,7 @@ ImageF flower_pattern(int size, std::uint64_t seed) {
     const double y = random.uniform();
     const double r = random.uniform(0.0018, 0.0032);
     for (int k = 0; k < 7; ++k) {
-      const double a = 2.0 * kPi * k / 7.0 + 0.3 * i;
+      const double a = 2.0 * std::numbers::pi * k / 7.0 + 0.3 * i;
       canvas.ellipse(x + 1.1 * r * std::cos(a), y + 1.1 * r * std::sin(a), 0.8 * r, 0.4 * r, a,
                      random.uniform_float(0.8, 1.0));
     }
@@ -30,8 +28,8 @@ ImageF flower_pattern(int size, std::uint64_t seed) {
   }
   for (int i = 0; i < 240; ++i) {
     const double r = random.uniform(0.001, 0.005);
-    canvas.ellipse(random.uniform(), random.uniform(), r, 0.55 * r, random.uniform(0.0, kPi),
-                   random.uniform_float(0.25, 0.75));
+    canvas.ellipse(random.uniform(), random.uniform(), r, 0.55 * r,
+                   random.uniform(0.0, std::numbers::pi), random.uniform_float(0.25, 0.75));
   }
   return canvas.image();
 }
@@ -42,7 +40,7 @@ struct LawnMaterials {
   std::vector<int> leaves;
 };
 
-LawnMaterials make_materials(SceneBuilder& b, std::uint64_t seed) {
+LawnMaterials lawn_materials(SceneBuilder& b, std::uint64_t seed) {
   LawnMaterials m;
   const int grass = b.texture(grass_pattern(1024, seed));
   const int flowers = b.texture(flower_pattern(1024, seed + 1));
@@ -75,7 +73,8 @@ LawnMaterials make_materials(SceneBuilder& b, std::uint64_t seed) {
   m.roof = b.material(roof);
   Material fence;
   fence.base = 0.0F;
-  fence.layers = {layer(b.texture(crate_pattern(512, seed + 5)), 1.9, Blend::kMax, 0.9F, 0.5 * kPi),
+  fence.layers = {layer(b.texture(crate_pattern(512, seed + 5)), 1.9, Blend::kMax, 0.9F,
+                        0.5 * std::numbers::pi),
                   layer(noise, 5.3, Blend::kMultiply, 0.8F)};
   m.fence = b.material(fence);
   m.shadow = b.cutout(spot_cutout(256, 0.3, 2.6, seed + 6), 1.0, 1.0);
@@ -96,7 +95,7 @@ void add_tufts(SceneBuilder& b, const LawnMaterials& m, const Footprint& way, Ra
     const double x = random.uniform(way.low().x() - 4.0, way.high().x() + 4.0);
     const double y = random.uniform(way.low().y() - 4.0, way.high().y() + 4.0);
     const double size = random.uniform(0.1, 0.26);
-    Surface& s = b.wall({x, y, -0.01}, random.uniform(0.0, 2.0 * kPi), size, size,
+    Surface& s = b.wall({x, y, -0.01}, random.uniform(0.0, 2.0 * std::numbers::pi), size, size,
                         m.tufts[static_cast<std::size_t>(random.below(3))]);
     s.two_sided = true;
     s.foot_shade = 0.0F;
@@ -110,7 +109,7 @@ void add_borders(SceneBuilder& b, const LawnMaterials& m, const Footprint& way, 
   const double rx = 0.5 * (way.high().x() - way.low().x()) + 11.0;
   const double ry = 0.5 * (way.high().y() - way.low().y()) + 11.0;
   for (int side = 0; side < 4; ++side) {
-    const double yaw = 0.5 * kPi * side;
+    const double yaw = 0.5 * std::numbers::pi * side;
     const double out = side % 2 == 0 ? rx : ry;
     const double width = 2.0 * (side % 2 == 0 ? ry : rx);
     for (double along = -0.5 * width; along < 0.5 * width; along += 3.0) {
@@ -135,7 +134,7 @@ void add_trees(SceneBuilder& b, const LawnMaterials& m, const Footprint& way, Ra
   const double reach =
       0.5 * std::hypot(way.high().x() - way.low().x(), way.high().y() - way.low().y());
   for (int i = 0; i < 9; ++i) {
-    const double around = 2.0 * kPi * (i + random.uniform(0.1, 0.7)) / 9.0;
+    const double around = 2.0 * std::numbers::pi * (i + random.uniform(0.1, 0.7)) / 9.0;
     const double out = reach + random.uniform(2.5, 5.5);
     SceneBuilder::Tree tree;
     tree.foot = {middle.x() + out * std::cos(around), middle.y() + out * std::sin(around), 0.0};
@@ -153,7 +152,7 @@ void add_trees(SceneBuilder& b, const LawnMaterials& m, const Footprint& way, Ra
   for (int i = 0; i < 14; ++i) {
     const double x = random.uniform(way.low().x() - 3.0, way.high().x() + 3.0);
     const double y = random.uniform(way.low().y() - 3.0, way.high().y() + 3.0);
-    b.shadow({x, y, 0.0}, random.uniform(0.0, kPi), random.uniform(1.2, 3.6),
+    b.shadow({x, y, 0.0}, random.uniform(0.0, std::numbers::pi), random.uniform(1.2, 3.6),
              random.uniform(0.8, 2.2), m.shadow);
   }
 }
@@ -166,7 +165,7 @@ Scene build_lawn(const Motion& motion, std::uint64_t seed) {
   b.scene().ambient = 0.5F;
   b.scene().sun = 1.1F;
   b.scene().exposure_s = 0.003;
-  const LawnMaterials m = make_materials(b, combine(seed, 11));
+  const LawnMaterials m = lawn_materials(b, combine(seed, 11));
   b.scene().sky = {0.75F, 1.0F, b.texture(cloud_pattern(512, seed)),
                    b.texture(noise_pattern(512, 8, 6, 0.6F, seed + 7)), 0.1F};
   b.scene().haze = 0.001;

@@ -10,14 +10,13 @@
 namespace sovo::sim {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kTile = 0.15;  ///< Side of a tile [m].
 
 struct PoolMaterials {
   int floor, wall, line, water, metal, toy;
 };
 
-PoolMaterials make_materials(SceneBuilder& b, std::uint64_t seed) {
+PoolMaterials pool_materials(SceneBuilder& b, std::uint64_t seed) {
   PoolMaterials m;
   const int tiles = b.texture(tile_pattern(1024, 16, seed));
   const int stains = b.texture(noise_pattern(512, 4, 8, 0.75F, seed + 1));
@@ -60,9 +59,9 @@ void add_basin(SceneBuilder& b, const PoolMaterials& m, const Basin& p) {
   const Vec3 middle(0.5 * (p.x0 + p.x1), 0.5 * (p.y0 + p.y1), 0.0);
   b.floor(middle, 0.0, length, width, m.floor);
   b.wall({p.x0, middle.y(), 0.0}, 0.0, width, p.depth, m.wall);
-  b.wall({p.x1, middle.y(), 0.0}, kPi, width, p.depth, m.wall);
-  b.wall({middle.x(), p.y0, 0.0}, 0.5 * kPi, length, p.depth, m.wall);
-  b.wall({middle.x(), p.y1, 0.0}, -0.5 * kPi, length, p.depth, m.wall);
+  b.wall({p.x1, middle.y(), 0.0}, std::numbers::pi, width, p.depth, m.wall);
+  b.wall({middle.x(), p.y0, 0.0}, 0.5 * std::numbers::pi, length, p.depth, m.wall);
+  b.wall({middle.x(), p.y1, 0.0}, -0.5 * std::numbers::pi, length, p.depth, m.wall);
   // The water's surface from below; it is bright, whatever the sun's side.
   Surface& water = b.quad(middle + p.depth * Vec3::UnitZ(), Vec3::UnitY(), Vec3::UnitX(), width,
                           length, m.water);
@@ -73,7 +72,7 @@ void add_basin(SceneBuilder& b, const PoolMaterials& m, const Basin& p) {
     for (const double x : {p.x0 + 2.0, p.x1 - 2.0}) {
       b.floor({x, y, 0.005}, 0.0, line, 6.0 * kTile, m.line);
     }
-    for (const double yaw : {0.0, kPi}) {  // targets on the walls
+    for (const double yaw : {0.0, std::numbers::pi}) {  // targets on the walls
       const double x = yaw == 0.0 ? p.x0 + 0.004 : p.x1 - 0.004;
       b.wall({x, y, 0.4}, yaw, line, p.depth - 0.8, m.line);
       b.wall({x, y, 0.9}, yaw, 6.0 * kTile, line, m.line).centre.x() += yaw == 0.0 ? 0.003 : -0.003;
@@ -93,7 +92,8 @@ void add_things(SceneBuilder& b, const PoolMaterials& m, const Basin& p, const F
     const double size = random.uniform(0.12, 0.35);
     if (way.near_point({x, y, size}, 0.6)) continue;
     if (random.chance(0.7)) {
-      b.box({x, y, 0.0}, random.uniform(0.0, kPi), {size, 0.6 * size, 0.5 * size}, m.toy, m.toy);
+      b.box({x, y, 0.0}, random.uniform(0.0, std::numbers::pi), {size, 0.6 * size, 0.5 * size},
+            m.toy, m.toy);
     } else {
       b.cylinder({x, y, 0.04}, Vec3(std::cos(4.0 * x), std::sin(4.0 * x), 0.0), 0.04, 2.0 * size,
                  m.metal);
@@ -121,7 +121,7 @@ Scene build_pool(const Motion& motion, std::uint64_t seed) {
   scene.ambient = 0.45F;
   scene.sun = 0.35F;
   scene.exposure_s = 0.006;
-  const PoolMaterials m = make_materials(b, combine(seed, 21));
+  const PoolMaterials m = pool_materials(b, combine(seed, 21));
   scene.caustics = b.texture(caustic_pattern(512, 100, combine(seed, 22)));
   scene.caustic_strength = 0.12F;
   scene.haze = 0.14;

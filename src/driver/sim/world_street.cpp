@@ -10,7 +10,6 @@
 namespace sovo::sim {
 namespace {
 
-constexpr double kPi = std::numbers::pi;
 constexpr double kRoad = 7.0;      ///< Width of the road [m].
 constexpr double kPavement = 2.6;  ///< Width of each pavement [m].
 
@@ -56,7 +55,7 @@ void make_ground(SceneBuilder& b, StreetMaterials* m, int noise, std::uint64_t s
       {layer(grass, 2.1, Blend::kMax, 0.8F, 0.2), layer(noise, 1.7, Blend::kMultiply, 1.8F, 1.1)});
 }
 
-StreetMaterials make_materials(SceneBuilder& b, int noise, std::uint64_t seed) {
+StreetMaterials street_materials(SceneBuilder& b, int noise, std::uint64_t seed) {
   StreetMaterials m;
   make_ground(b, &m, noise, seed);
   m.roof = add_material(b, 0.25F,
@@ -257,7 +256,8 @@ class StreetBuilder {
         b_.cylinder(foot + Vec3(0, 0, 3.0), Vec3::UnitZ(), 0.09, 6.0, m_.pole);
       } else if (!way_.near(foot.x(), foot.y(), 1.8)) {
         b_.cylinder(foot + Vec3(0, 0, 1.2), Vec3::UnitZ(), 0.05, 2.4, m_.pole);
-        Surface& sign = b_.wall(foot + Vec3(0, 0, 1.7), p.heading + kPi, 0.7, 0.7, m_.sign);
+        Surface& sign =
+            b_.wall(foot + Vec3(0, 0, 1.7), p.heading + std::numbers::pi, 0.7, 0.7, m_.sign);
         sign.two_sided = true;
         b_.box(beside(p, out + side * 1.2), p.heading, {0.6, 0.5, 1.1}, m_.sign, m_.sign);
       }
@@ -280,7 +280,7 @@ Scene build_street(const Motion& motion, std::uint64_t seed) {
   b.scene().sun = 1.0F;
   b.scene().exposure_s = 0.003;
   const int noise = b.texture(noise_pattern(512, 4, 8, 0.75F, combine(seed, 41)));
-  const StreetMaterials m = make_materials(b, noise, combine(seed, 42));
+  const StreetMaterials m = street_materials(b, noise, combine(seed, 42));
   b.scene().sky = {0.8F, 1.1F, b.texture(cloud_pattern(512, combine(seed, 43))),
                    b.texture(noise_pattern(512, 8, 6, 0.6F, combine(seed, 44))), 0.12F};
   b.scene().haze = 0.0018;

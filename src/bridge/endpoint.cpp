@@ -4,6 +4,7 @@
 #include <array>
 #include <vector>
 
+#include "sovo/bridge/cdr_sertype.h"
 #include "sovo/bridge/ros_names.h"
 
 namespace sovo::bridge {
@@ -11,9 +12,18 @@ namespace {
 
 Result<DdsHandle> open_topic(const Participant& participant, const std::string& ros_name,
                              const TypeInfo& type) {
-  return take_entity(dds_create_topic(participant.entity(), type.descriptor,
-                                      dds_topic(ros_name).c_str(), nullptr, nullptr),
-                     "cannot create topic " + ros_name);
+  const std::string name = dds_topic(ros_name);
+  const std::string what = "cannot create topic " + ros_name;
+  if (type.descriptor != nullptr) {
+    return take_entity(
+        dds_create_topic(participant.entity(), type.descriptor, name.c_str(), nullptr, nullptr),
+        what);
+  }
+  ddsi_sertype* sertype = new_cdr_sertype(type.raw_name);
+  const dds_entity_t topic = dds_create_topic_sertype(participant.entity(), name.c_str(), &sertype,
+                                                      nullptr, nullptr, nullptr);
+  if (topic < 0) ddsi_sertype_unref(sertype);
+  return take_entity(topic, what);
 }
 
 }  // namespace

@@ -10,10 +10,11 @@
 
 namespace sovo::bridge {
 
-/// What the typed readers and writers need to know of a message type.
+/// What readers and writers need to know of a message type.
 struct TypeInfo {
-  const dds_topic_descriptor_t* descriptor = nullptr;
+  const dds_topic_descriptor_t* descriptor = nullptr;  ///< Null: pass messages on as bytes.
   const char* hash = "";
+  const char* raw_name = "";  ///< DDS name of the type when there is no descriptor.
 };
 
 /// A writer without its type, see writer.h.

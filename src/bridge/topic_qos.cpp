@@ -9,7 +9,9 @@ constexpr dds_duration_t kMaxBlockingTime = DDS_MSECS(33);
 
 QosPtr common_qos(const TopicQos& qos, const std::string& type_hash) {
   QosPtr result(dds_create_qos());
-  dds_qset_reliability(result.get(), DDS_RELIABILITY_RELIABLE, kMaxBlockingTime);
+  dds_qset_reliability(result.get(),
+                       qos.best_effort ? DDS_RELIABILITY_BEST_EFFORT : DDS_RELIABILITY_RELIABLE,
+                       kMaxBlockingTime);
   dds_qset_durability(result.get(),
                       qos.latched ? DDS_DURABILITY_TRANSIENT_LOCAL : DDS_DURABILITY_VOLATILE);
   dds_qset_history(result.get(), DDS_HISTORY_KEEP_LAST, qos.depth);

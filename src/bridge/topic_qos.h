@@ -6,14 +6,15 @@
 
 namespace sovo::bridge {
 
-/// Quality of service of a topic: reliable, keep-last.
+/// Quality of service of a topic: keep-last, reliable unless it says otherwise.
 struct TopicQos {
   int depth = 10;
-  bool latched = false;  ///< Transient-local: late readers get the last `depth` samples.
+  bool latched = false;      ///< Transient-local: late readers get the last `depth` samples.
+  bool best_effort = false;  ///< As a reader: also takes from writers that do not repeat.
 };
 
-constexpr TopicQos reliable(int depth) { return {depth, false}; }
-constexpr TopicQos latched(int depth) { return {depth, true}; }
+constexpr TopicQos reliable(int depth) { return {depth, false, false}; }
+constexpr TopicQos latched(int depth) { return {depth, true, false}; }
 
 /// QoS of a reader. `type_hash`: RIHS01 text for USER_DATA, which ROS 2 complains without.
 QosPtr reader_qos(const TopicQos& qos, const std::string& type_hash);

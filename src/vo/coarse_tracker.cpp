@@ -53,6 +53,30 @@ Vec8 damped_step(Mat8 H, const Vec8& gradient, const Vec8& prior, const Vec8& un
   return step;
 }
 
+/// Sums of pairs of values.
+struct Moments {
+  double n = 0.0, x = 0.0, y = 0.0, xx = 0.0, yy = 0.0, xy = 0.0;
+
+  /// Pairs that are left out are zero in all three.
+  void add(float one, float a, float b) {
+    const double da = a;
+    const double db = b;
+    n += one;
+    x += da;
+    y += db;
+    xx += da * da;
+    yy += db * db;
+    xy += da * db;
+  }
+
+  /// Pearson's; 0 where either does not vary.
+  double correlation() const {
+    const double var_x = n * xx - x * x;
+    const double var_y = n * yy - y * y;
+    return var_x > 0.0 && var_y > 0.0 ? (n * xy - x * y) / std::sqrt(var_x * var_y) : 0.0;
+  }
+};
+
 /// Units that make the eight unknowns comparable in the stop test.
 Vec8 tracker_units(double mean_rho) {
   Vec8 s;
@@ -178,6 +202,21 @@ double CoarseTracker::residuals(const ReferenceLevel& level, const ImageF& image
   const double energy = (energies[0] + energies[1]) + (energies[2] + energies[3]);
   out->energy = out->in_view > 0 ? energy / out->in_view : 1e10;
   return out->energy;
+}
+
+double CoarseTracker::correlation(const ReferenceLevel& level, const ImageF& image, const SE3& T) {
+  const Warp warp(level.camera, T);
+  const Lane zero = lane_of(0.0F);
+  Moments moments;
+  for (std::size_t i = 0; i < level.size(); i += kLanes) {
+    const Projected p = project(level, i, image, warp);
+    const LaneSample s = sample_lanes_with_gradient(image, p.offset.data(), p.fx, p.fy);
+    const Lane x = p.in_view ? p.colour : zero;
+    const Lane y = p.in_view ? s.value : zero;
+    const Lane one = p.in_view ? lane_of(1.0F) : zero;
+    for (std::size_t k = 0; k < kLanes; ++k) moments.add(one[k], x[k], y[k]);
+  }
+  return moments.correlation();
 }
 
 void CoarseTracker::normal_equations(const BrightnessTransfer& transfer, double reference_b,
@@ -341,7 +380,9 @@ TrackingResult CoarseTracker::track(const TrackingReference& reference, const Im
     if (best.good && enough && best.inlier_ratio > config_.min_inlier_ratio) break;
   }
   if (!best.good) return best;
-  best.good = best.rmse < config_.max_rmse && best.inlier_ratio > config_.min_inlier_ratio;
+  best.correlation = correlation(reference.levels[0], pyramid.level(0), best.T_current_reference);
+  best.good = best.rmse < config_.max_rmse && best.inlier_ratio > config_.min_inlier_ratio &&
+              best.correlation > config_.min_correlation;
   measure_flow(reference, best.T_current_reference, &best.flow_translation, &best.flow_total);
   return best;
 }

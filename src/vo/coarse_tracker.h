@@ -19,6 +19,7 @@ struct TrackingResult {
   double rmse = 0.0;          ///< Of the finest level, saturated residuals at the cutoff.
   double inlier_ratio = 0.0;  ///< Reference pixels in view that are not saturated.
   double view_ratio = 0.0;    ///< Reference pixels that are in view.
+  double correlation = 0.0;   ///< Of the brightness of reference pixels in view and image, -1..1.
   int inliers = 0;
   double flow_translation = 0.0;    ///< RMS flow of the points without the rotation [px].
   double flow_total = 0.0;          ///< RMS flow of the points [px].
@@ -66,6 +67,7 @@ class CoarseTracker {
   };
   double residuals(const ReferenceLevel& level, const ImageF& image, const SE3& T,
                    const BrightnessTransfer& transfer, double cutoff, Linearization* out);
+  static double correlation(const ReferenceLevel& level, const ImageF& image, const SE3& T);
   void normal_equations(const BrightnessTransfer& transfer, double reference_b,
                         Linearization* out) const;
   LevelOutcome align_level(const TrackingReference& reference, int level, const ImageF& image,

@@ -10,6 +10,9 @@ struct TrackerConfig {
   double lost_rmse_factor = 1.5;  ///< A hypothesis this much better than the last frame is taken.
   double max_rmse = 40.0;         ///< Lost above [grey levels].
   double min_inlier_ratio = 0.3;  ///< Lost below: reference pixels in view that agree.
+  /// Lost below: correlation of reference and image. Right poses have 0.85 and more on real clips;
+  /// an unrelated image of little contrast may have small residuals, but no correlation.
+  double min_correlation = 0.4;
   double brightness_prior_a = 100.0;  ///< Weight of a prior on the log-gain to the reference.
   double brightness_prior_b = 0.0;    ///< The same for the bias.
 
@@ -21,6 +24,7 @@ struct TrackerConfig {
     v("lost_rmse_factor", lost_rmse_factor, "a motion hypothesis is taken below this x last RMSE");
     v("max_rmse", max_rmse, "tracking is lost above [grey levels]");
     v("min_inlier_ratio", min_inlier_ratio, "tracking is lost below");
+    v("min_correlation", min_correlation, "tracking is lost below");
     v("brightness_prior_a", brightness_prior_a, "weight of the prior on the log-gain");
     v("brightness_prior_b", brightness_prior_b, "weight of the prior on the bias");
   }

@@ -145,6 +145,27 @@ TEST(CoarseTracker, TakesTheHypothesisThatFits) {
   EXPECT_LT((result.T_current_reference * truth.inverse()).log().norm(), 0.006);
 }
 
+// A small gain takes the reference's contrast away: residuals alone let such an image pass.
+TEST(CoarseTracker, UnrelatedSceneOfSmallResidualsIsLost) {
+  const SyntheticScene scene(3);
+  const CameraModel camera = small_camera();
+  const TrackingReference reference = scene_reference(scene);
+  const std::vector<SE3> start = {SE3()};
+  const ImagePyramidPtr other = scene_view(SyntheticScene(11), camera, SE3());
+  TrackerConfig config;
+  EXPECT_FALSE(CoarseTracker(config).track(reference, *other, 0.0, {}, start, 3.0).good);
+  config.min_correlation = -1.0;
+  EXPECT_TRUE(CoarseTracker(config).track(reference, *other, 0.0, {}, start, 3.0).good)
+      << "residuals alone tell this one; the test needs another";
+  config = {};
+  ImageF faint = (*scene_view(scene, camera, SE3()))[0];
+  for (std::size_t i = 0; i < faint.size(); ++i) faint.data()[i] = 60.0F + 0.4F * faint.data()[i];
+  const TrackingResult seen =
+      CoarseTracker(config).track(reference, *pyramid_of(faint), 0.0, {}, start, 3.0);
+  EXPECT_TRUE(seen.good);
+  EXPECT_GT(seen.correlation, 0.95);
+}
+
 TEST(CoarseTracker, UnrelatedOrEmptyImageIsLost) {
   const SyntheticScene scene(3);
   const CameraModel camera = small_camera();

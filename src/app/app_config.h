@@ -81,10 +81,16 @@ struct OutputSection {
 struct NodeSection {
   bool publish_tf = true;
   double idle_exit_s = 0.0;
+  std::string left;  ///< Image topics of a ROS 2 driver; empty: sovo's own frames.
+  std::string right;
+  double pair_tolerance_s = 0.005;
 
   template <class Visitor>
   void visit(Visitor& v) {
     v("publish_tf", publish_tf, "publish odom -> base_link; false beside another filter");
+    v("left", left, "left image topic of a ROS 2 driver; empty: frames of sovo camera");
+    v("right", right, "its right image topic");
+    v("pair_tolerance_s", pair_tolerance_s, "largest difference of stamps in its pairs [s]");
     v("idle_exit_s", idle_exit_s, "sovo vo ends when no frame came this long [s]; 0: never");
   }
 };

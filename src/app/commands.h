@@ -14,6 +14,7 @@ void add_config_command(const Command& program);
 void add_eval_command(const Command& program);
 void add_run_command(const Command& program);
 void add_status_command(const Command& program);
+void add_topic_command(const Command& program);
 void add_vo_command(const Command& program);
 
 }  // namespace sovo::app

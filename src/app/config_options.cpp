@@ -83,6 +83,12 @@ Result<void> check_config(const AppConfig& config) {
   if (config.odometry.downscale < 1) return Error{"downscale must be at least 1"};
   if (config.odometry.mapping_queue < 1) return Error{"mapping_queue must be at least 1"};
   if (!(config.node.idle_exit_s >= 0.0)) return Error{"node.idle_exit_s must not be negative"};
+  if (config.node.left.empty() != config.node.right.empty()) {
+    return Error{"node.left and node.right (--left, --right) are given together"};
+  }
+  if (!(config.node.pair_tolerance_s >= 0.0)) {
+    return Error{"node.pair_tolerance_s must not be negative"};
+  }
   return {};
 }
 

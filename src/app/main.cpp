@@ -31,6 +31,7 @@ int run(int argc, char** argv) {
   add_camera_command(root);
   add_vo_command(root);
   add_status_command(root);
+  add_topic_command(root);
   add_command_command(root);
   add_eval_command(root);
   add_bench_command(root);

@@ -10,6 +10,7 @@
 #include "sovo/app/odometry_session.h"
 #include "sovo/app/stop_signal.h"
 #include "sovo/bridge/command_subscriber.h"
+#include "sovo/bridge/ros_stereo_subscriber.h"
 #include "sovo/bridge/stereo_subscriber.h"
 #include "sovo/bridge/vo_publisher.h"
 #include "sovo/io/calibration.h"
@@ -22,7 +23,7 @@ using Clock = std::chrono::steady_clock;
 /// The odometry process: frames and commands from the bus in, odometry out.
 class VoProcess {
  public:
-  VoProcess(const AppConfig& config, bridge::StereoSubscriber& source,
+  VoProcess(const AppConfig& config, bridge::StereoFeed& source,
             bridge::CommandSubscriber& commands, bridge::VoPublisher& publisher)
       : config_(config),
         source_(source),
@@ -159,7 +160,7 @@ class VoProcess {
   };
 
   const AppConfig& config_;
-  bridge::StereoSubscriber& source_;
+  bridge::StereoFeed& source_;
   bridge::CommandSubscriber& commands_;
   bridge::VoPublisher& publisher_;
   OdometrySession session_;
@@ -180,7 +181,7 @@ Result<std::optional<StereoCameras>> read_calibration(const std::string& path) {
 
 /// Waits until the source's calibration has come; says now and then what is missing. False when
 /// the user stops.
-bool wait_for_calibration(bridge::StereoSubscriber& source, StopSignal& stop) {
+bool wait_for_calibration(bridge::StereoFeed& source, StopSignal& stop) {
   std::string told;
   auto last_told = Clock::now() - std::chrono::seconds(10);
   while (!stop.requested()) {
@@ -194,6 +195,25 @@ bool wait_for_calibration(bridge::StereoSubscriber& source, StopSignal& stop) {
   return false;
 }
 
+/// Our own frames, or those of two image topics.
+Result<std::unique_ptr<bridge::StereoFeed>> open_source(const AppConfig& config,
+                                                        const bridge::Participant& participant,
+                                                        std::optional<StereoCameras> calibration) {
+  using Source = std::unique_ptr<bridge::StereoFeed>;
+  if (config.node.left.empty()) {
+    auto source = bridge::StereoSubscriber::open(participant, {}, std::move(calibration));
+    if (!source) return source.failure();
+    return Source(std::move(*source));
+  }
+  bridge::RosStereoConfig topics;
+  topics.left = config.node.left;
+  topics.right = config.node.right;
+  topics.tolerance_s = config.node.pair_tolerance_s;
+  auto source = bridge::RosStereoSubscriber::open(participant, topics, std::move(calibration));
+  if (!source) return source.failure();
+  return Source(std::move(*source));
+}
+
 int run(const AppConfig& config) {
   if (auto writable = check_outputs(config.output); !writable) {
     return fail(kUsage, writable.error());
@@ -205,7 +225,7 @@ int run(const AppConfig& config) {
   if (!participant) return fail(kFailed, participant.error());
   for (const std::string& note : participant->notes()) spdlog::info("{}", note);
 
-  auto source = bridge::StereoSubscriber::open(*participant, {}, std::move(*calibration));
+  auto source = open_source(config, *participant, std::move(*calibration));
   if (!source) return fail(kFailed, source.error());
   auto commands = bridge::CommandSubscriber::open(*participant);
   if (!commands) return fail(kFailed, commands.error());
@@ -218,7 +238,9 @@ int run(const AppConfig& config) {
   auto publisher =
       bridge::VoPublisher::open(*participant, publishing, (*source)->rig().T_base_left);
   if (!publisher) return fail(kFailed, publisher.error());
-  spdlog::info("tracking frames of {}", participant->topic("stereo"));
+  spdlog::info("tracking frames of {}", config.node.left.empty()
+                                            ? participant->topic("stereo")
+                                            : config.node.left + " and " + config.node.right);
   return VoProcess(config, **source, *commands, **publisher).run(stop);
 }
 
@@ -230,6 +252,8 @@ void add_vo_command(const Command& program) {
   auto options = std::make_shared<ConfigOptions>(command);
   options
       ->value("--calib", "camera.calibration", "Calibration file, instead of the camera's", "FILE")
+      .value("--left", "node.left", "Left image topic of any ROS 2 driver", "TOPIC")
+      .value("--right", "node.right", "Its right one; calibration from camera_info beside", "TOPIC")
       .value("--frames", "camera.frames", "End after so many frames", "N")
       .value("--idle-exit", "node.idle_exit_s", "End when no frame came this long", "SECONDS");
   add_odometry_options(*options);

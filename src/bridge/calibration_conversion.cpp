@@ -40,7 +40,34 @@ bool fits(Distortion distortion, std::uint32_t coefficients) {
   return false;
 }
 
-Result<CameraModel> camera_of(const msg::CameraModel& m, const std::string& name) {
+Result<PhotometricCalibration> photometric_of(const msg::CameraModel& m, const std::string& name) {
+  PhotometricCalibration result;
+  if (m.response._length != 0) {
+    if (m.response._length != kResponseSize || !all_finite(m.response._buffer, kResponseSize)) {
+      return Error{name + ".response is not 256 numbers"};
+    }
+    result.inverse_response.resize(kResponseSize);
+    std::transform(m.response._buffer, m.response._buffer + kResponseSize,
+                   result.inverse_response.begin(), [](double v) { return static_cast<float>(v); });
+  }
+  if (m.vignette._length != 0) {
+    if (m.vignette._length != std::uint64_t{m.width} * m.height) {
+      return Error{name + ".vignette has " + std::to_string(m.vignette._length) +
+                   " values, not one a pixel"};
+    }
+    result.vignette.resize(static_cast<int>(m.width), static_cast<int>(m.height));
+    // 0 would make a pixel infinitely bright.
+    std::transform(m.vignette._buffer, m.vignette._buffer + m.vignette._length,
+                   result.vignette.data(), [](std::uint16_t v) {
+                     return static_cast<float>(std::max<std::uint16_t>(v, 1)) / kVignetteScale;
+                   });
+  }
+  return result;
+}
+
+}  // namespace
+
+Result<CameraModel> from_message(const msg::CameraModel& m, const std::string& name) {
   if (m.width == 0 || m.height == 0 || m.width > kLargestImage || m.height > kLargestImage) {
     return Error{name + ": size " + std::to_string(m.width) + "x" + std::to_string(m.height) +
                  " px is not between 1 and " + std::to_string(kLargestImage)};
@@ -71,33 +98,6 @@ Result<CameraModel> camera_of(const msg::CameraModel& m, const std::string& name
   }
   return camera;
 }
-
-Result<PhotometricCalibration> photometric_of(const msg::CameraModel& m, const std::string& name) {
-  PhotometricCalibration result;
-  if (m.response._length != 0) {
-    if (m.response._length != kResponseSize || !all_finite(m.response._buffer, kResponseSize)) {
-      return Error{name + ".response is not 256 numbers"};
-    }
-    result.inverse_response.resize(kResponseSize);
-    std::transform(m.response._buffer, m.response._buffer + kResponseSize,
-                   result.inverse_response.begin(), [](double v) { return static_cast<float>(v); });
-  }
-  if (m.vignette._length != 0) {
-    if (m.vignette._length != std::uint64_t{m.width} * m.height) {
-      return Error{name + ".vignette has " + std::to_string(m.vignette._length) +
-                   " values, not one a pixel"};
-    }
-    result.vignette.resize(static_cast<int>(m.width), static_cast<int>(m.height));
-    // 0 would make a pixel infinitely bright.
-    std::transform(m.vignette._buffer, m.vignette._buffer + m.vignette._length,
-                   result.vignette.data(), [](std::uint16_t v) {
-                     return static_cast<float>(std::max<std::uint16_t>(v, 1)) / kVignetteScale;
-                   });
-  }
-  return result;
-}
-
-}  // namespace
 
 msg::CameraModel CalibrationMessage::fill(const CameraModel& camera,
                                           const PhotometricCalibration& photometric,
@@ -140,9 +140,9 @@ CalibrationMessage::CalibrationMessage(const StereoCameras& cameras, const std::
 Result<StereoCameras> from_message(const msg::StereoCalibration& m) {
   StereoCameras cameras;
   cameras.rig.name = text_or_empty(m.name);
-  auto left = camera_of(m.left, "left");
+  auto left = from_message(m.left, "left");
   if (!left) return left.failure();
-  auto right = camera_of(m.right, "right");
+  auto right = from_message(m.right, "right");
   if (!right) return right.failure();
   auto left_photometric = photometric_of(m.left, "left");
   if (!left_photometric) return left_photometric.failure();

@@ -38,6 +38,9 @@ class CalibrationMessage {
   msg::StereoCalibration message_{};
 };
 
+/// Geometry of a camera that anyone may have described; `name` is for the error text.
+Result<CameraModel> from_message(const msg::CameraModel& message, const std::string& name);
+
 /// Rig and photometric calibration of a message that anyone may have sent; the error says which
 /// field is wrong. Masks stay empty: they belong to the odometry, not to the camera.
 Result<StereoCameras> from_message(const msg::StereoCalibration& message);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -7,6 +9,7 @@
 #include "sovo/geometry/stereo_rig.h"
 #include "sovo/image/stereo_rectification.h"
 #include "sovo/io/result.h"
+#include "sovo/odometry/stereo_odometry.h"
 
 namespace sovo::bridge {
 
@@ -28,5 +31,24 @@ class CameraInfoMessage {
   std::vector<double> coefficients_;
   msg::CameraInfo message_{};
 };
+
+/// A CameraInfo message that lies in memory of its own.
+struct CameraInfoCopy {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::string distortion_model;
+  std::vector<double> d;
+  std::array<double, 9> k{};
+  std::array<double, 9> r{};
+  std::array<double, 12> p{};
+};
+
+CameraInfoCopy copy(const msg::CameraInfo& message);
+
+/// The rig of two CameraInfo messages that anyone may have sent; the error says what is wrong.
+/// Raw images have intrinsics `k` and distortion `d`; `rectified` ones those of `p`. Extrinsics are
+/// those of `r` and `p`. The base frame lies in the left camera.
+Result<StereoCameras> cameras_from(const CameraInfoCopy& left, const CameraInfoCopy& right,
+                                   bool rectified);
 
 }  // namespace sovo::bridge

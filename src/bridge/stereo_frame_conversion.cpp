@@ -1,5 +1,6 @@
 #include "sovo/bridge/stereo_frame_conversion.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <string>
@@ -15,21 +16,40 @@ constexpr std::int64_t kLargestOffsetNs = 10'000'000'000;
 
 using Pixels = std::shared_ptr<const std::vector<std::uint8_t>>;
 
-/// How a row of an encoding becomes grey.
-using RowToGrey = void (*)(const std::uint8_t* row, int width, std::uint8_t* grey);
+/// A row of an image, and those above and below it.
+struct Rows {
+  const std::uint8_t* above;
+  const std::uint8_t* row;
+  const std::uint8_t* below;
+};
 
-/// ITU-R BT.601 luma in 14-bit fixed point; R and B are bytes kR and kB of a pixel.
-template <int kR, int kB>
-void row_of_colour(const std::uint8_t* row, int width, std::uint8_t* grey) {
-  for (int x = 0; x < width; ++x, row += 3) {
-    const int luma = 4899 * row[kR] + 9617 * row[1] + 1868 * row[kB] + 8192;
+/// How a row of an encoding becomes grey.
+using RowToGrey = void (*)(const Rows& rows, int width, std::uint8_t* grey);
+
+/// ITU-R BT.601 luma in 14-bit fixed point; R and B are bytes kR and kB of a pixel of kBytes.
+template <int kR, int kB, int kBytes>
+void row_of_colour(const Rows& rows, int width, std::uint8_t* grey) {
+  const std::uint8_t* pixel = rows.row;
+  for (int x = 0; x < width; ++x, pixel += kBytes) {
+    const int luma = 4899 * pixel[kR] + 9617 * pixel[1] + 1868 * pixel[kB] + 8192;
     grey[x] = static_cast<std::uint8_t>(luma >> 14);
   }
 }
 
 /// Y0 U Y1 V: every second byte.
-void row_of_yuyv(const std::uint8_t* row, int width, std::uint8_t* grey) {
-  for (int x = 0; x < width; ++x) grey[x] = row[2 * x];
+void row_of_yuyv(const Rows& rows, int width, std::uint8_t* grey) {
+  for (int x = 0; x < width; ++x) grey[x] = rows.row[2 * x];
+}
+
+/// The weights 1 2 1 in both directions give (R + 2 G + B) / 4 at every pixel of every Bayer
+/// pattern, centred on it.
+void row_of_bayer(const Rows& rows, int width, std::uint8_t* grey) {
+  const auto column = [&](int x) { return rows.above[x] + 2 * rows.row[x] + rows.below[x]; };
+  for (int x = 0; x < width; ++x) {
+    const int left = x > 0 ? x - 1 : std::min(1, width - 1);
+    const int right = x + 1 < width ? x + 1 : std::max(width - 2, 0);
+    grey[x] = static_cast<std::uint8_t>((column(left) + 2 * column(x) + column(right) + 8) >> 4);
+  }
 }
 
 struct Encoding {
@@ -42,10 +62,25 @@ struct Encoding {
 constexpr Encoding kEncodings[] = {
     {"mono8", 1, PixelFormat::kMono8, nullptr},
     {"mono16", 2, PixelFormat::kMono16, nullptr},
-    {"bgr8", 3, PixelFormat::kMono8, row_of_colour<2, 0>},
-    {"rgb8", 3, PixelFormat::kMono8, row_of_colour<0, 2>},
+    {"bgr8", 3, PixelFormat::kMono8, row_of_colour<2, 0, 3>},
+    {"rgb8", 3, PixelFormat::kMono8, row_of_colour<0, 2, 3>},
     {"yuv422_yuy2", 2, PixelFormat::kMono8, row_of_yuyv},
+    {"bgra8", 4, PixelFormat::kMono8, row_of_colour<2, 0, 4>},
+    {"rgba8", 4, PixelFormat::kMono8, row_of_colour<0, 2, 4>},
+    {"8UC1", 1, PixelFormat::kMono8, nullptr},
+    {"bayer_rggb8", 1, PixelFormat::kMono8, row_of_bayer},
+    {"bayer_bggr8", 1, PixelFormat::kMono8, row_of_bayer},
+    {"bayer_gbrg8", 1, PixelFormat::kMono8, row_of_bayer},
+    {"bayer_grbg8", 1, PixelFormat::kMono8, row_of_bayer},
 };
+
+std::string encoding_names() {
+  std::string names;
+  for (const Encoding& encoding : kEncodings) {
+    names += (names.empty() ? "" : ", ") + std::string(encoding.name);
+  }
+  return names;
+}
 
 const Encoding* find_encoding(const char* name) {
   for (const Encoding& encoding : kEncodings) {
@@ -100,8 +135,14 @@ Pixels copy_pixels(const msg::SideImage& m) {
 
 Pixels grey_pixels(const msg::SideImage& m, RowToGrey to_grey) {
   auto grey = std::make_shared<std::vector<std::uint8_t>>(std::size_t{m.width} * m.height);
-  for (std::size_t y = 0; y < m.height; ++y) {
-    to_grey(m.data._buffer + y * m.step, static_cast<int>(m.width), grey->data() + y * m.width);
+  const std::size_t last = m.height - 1;
+  const auto row = [&m](std::size_t y) { return m.data._buffer + y * m.step; };
+  for (std::size_t y = 0; y <= last; ++y) {
+    // Mirrored at the edges, which keeps a Bayer pattern in step.
+    const std::size_t above = y > 0 ? y - 1 : std::min<std::size_t>(1, last);
+    const std::size_t below = y < last ? y + 1 : std::max<std::size_t>(last, 1) - 1;
+    to_grey({row(above), row(y), row(below)}, static_cast<int>(m.width),
+            grey->data() + y * m.width);
   }
   return grey;
 }
@@ -152,8 +193,7 @@ Result<SideImage> from_message(const msg::SideImage& m, const std::string& name)
   if (!m.valid) return side;
   const Encoding* encoding = find_encoding(m.encoding);
   if (encoding == nullptr) {
-    return Error{name + ".encoding " + shown(m.encoding) +
-                 " is not one of mono8, mono16, bgr8, rgb8, yuv422_yuy2"};
+    return Error{name + ".encoding " + shown(m.encoding) + " is not one of " + encoding_names()};
   }
   std::string wrong = wrong_size(m, *encoding);
   if (wrong.empty()) wrong = wrong_numbers(m);
@@ -168,6 +208,33 @@ Result<SideImage> from_message(const msg::SideImage& m, const std::string& name)
   side.gain_db = m.gain_db;
   side.stamp_offset_ns = m.stamp_offset_ns;
   return side;
+}
+
+Result<SideImage> from_message(const msg::Image& m, const std::string& name) {
+  if (m.header.stamp.nanosec >= 1'000'000'000U) {
+    return Error{name + ".header.stamp.nanosec " + std::to_string(m.header.stamp.nanosec) +
+                 " is a second or more"};
+  }
+  msg::SideImage side{};
+  side.valid = true;
+  side.width = m.width;
+  side.height = m.height;
+  side.step = m.step;
+  side.encoding = m.encoding;
+  side.data = m.data;
+  auto image = from_message(side, name);
+  if (!image || m.is_bigendian == 0 || image->format != PixelFormat::kMono16) return image;
+  auto swapped = std::make_shared<std::vector<std::uint8_t>>(*image->data);
+  for (std::size_t y = 0; y < m.height; ++y) {
+    std::uint8_t* row = swapped->data() + y * m.step;
+    for (std::size_t x = 0; x < m.width; ++x) std::swap(row[2 * x], row[2 * x + 1]);
+  }
+  image->data = std::move(swapped);
+  return image;
+}
+
+std::string short_text(const char* text) {
+  return {text_or_empty(text), ::strnlen(text_or_empty(text), kLongestFrameId)};
 }
 
 Result<StereoFrame> from_message(const msg::StereoFrame& m) {

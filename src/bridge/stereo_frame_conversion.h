@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include "message_traits.h"
 #include "sovo/image/stereo_frame.h"
 #include "sovo/io/result.h"
@@ -21,5 +23,11 @@ Result<StereoFrame> from_message(const msg::StereoFrame& message);
 
 /// One side of a frame, as above; `name` is for the error text.
 Result<SideImage> from_message(const msg::SideImage& message, const std::string& name);
+
+/// A ROS image, as above. Of Bayer patterns each pixel's neighbourhood gives the grey level.
+Result<SideImage> from_message(const msg::Image& message, const std::string& name);
+
+/// A text from the network, at most 256 characters of it.
+std::string short_text(const char* text);
 
 }  // namespace sovo::bridge

@@ -14,7 +14,7 @@
 #include "sovo/bridge/participant.h"
 #include "sovo/bridge/reader.h"
 #include "sovo/bridge/session_lock.h"
-#include "sovo/driver/frame_source.h"
+#include "sovo/bridge/stereo_feed.h"
 
 namespace sovo::bridge {
 
@@ -27,15 +27,6 @@ struct StereoSubscriberConfig {
   }
 };
 
-/// What became of the frames that were published.
-struct FeedCounters {
-  std::uint64_t received = 0;        ///< Well-formed frames of the followed publisher.
-  std::uint64_t lost_transport = 0;  ///< Missing in its sequence.
-  std::uint64_t dropped_queue = 0;   ///< Given up because `next` was not called in time.
-  std::uint64_t rejected = 0;        ///< Malformed frames.
-  std::uint64_t foreign = 0;         ///< Frames of a second publisher.
-};
-
 /// Stereo frames from the bus. A thread of its own takes and checks them as they come.
 ///
 ///     auto source = StereoSubscriber::open(participant, config);
@@ -46,7 +37,7 @@ struct FeedCounters {
 /// It follows the first publisher that it hears. A frame that is malformed comes out of `next` as
 /// kBadFrame with the reason, a second publisher once likewise, and a followed publisher with
 /// another calibration than the first ends the stream with kFailed.
-class StereoSubscriber : public FrameSource {
+class StereoSubscriber : public StereoFeed {
  public:
   /// `calibration`: when given, it is used and that of the publisher is not asked for.
   static Result<std::unique_ptr<StereoSubscriber>> open(
@@ -55,22 +46,16 @@ class StereoSubscriber : public FrameSource {
   ~StereoSubscriber() override;
 
   /// Waits for the calibration of the followed publisher; what is missing when it does not come.
-  Result<void> wait_for_calibration(std::chrono::milliseconds timeout);
-
-  /// Precondition: wait_for_calibration has succeeded.
-  const StereoCameras& cameras() const { return *cameras_; }
-  const StereoRig& rig() const override { return cameras_->rig; }
+  Result<void> wait_for_calibration(std::chrono::milliseconds timeout) override;
+  const StereoCameras& cameras() const override { return *cameras_; }
 
   SourceResult next(std::chrono::milliseconds timeout) override;
 
   /// Ends a wait in `next`, the present or the next one; from any thread.
   void wake();
 
-  FeedCounters counters() const;
-
-  /// Time that the latency of the last frame of `next` counts from [ns, UTC]: its stamp, or for
-  /// frames of a dataset, whose stamps are history, when it was sent.
-  std::int64_t latency_origin_ns() const { return latency_origin_ns_; }
+  FeedCounters counters() const override;
+  std::int64_t latency_origin_ns() const override { return latency_origin_ns_; }
 
  private:
   struct Item {

@@ -61,6 +61,8 @@ class OdometrySession {
   /// Begins anew with a source whose stamps have nothing to do with those before; what was
   /// recorded is forgotten.
   void restart();
+  /// The undistorted camera that keyframes' points belong to.
+  const CameraModel& tracked_camera() const { return odometry_->tracked_camera(); }
   RunCounts counts() const { return recorder_.counts(); }
 
   /// Finishes the work, writes the files and prints the summary to stdout. Returns an exit code:

@@ -28,7 +28,9 @@ class VoProcess {
         source_(source),
         commands_(commands),
         publisher_(publisher),
-        session_(config, source.cameras(), {&publisher}, {publisher.timings()}) {}
+        session_(config, source.cameras(), {&publisher}, {publisher.timings()}) {
+    publisher.set_cameras(session_.tracked_camera(), source.cameras().rig.left);
+  }
 
   /// Works until the user stops it, the source has gone or enough frames were taken; returns an
   /// exit code.
@@ -68,6 +70,7 @@ class VoProcess {
   void take(const StereoFrame& frame) {
     ++taken_;
     follow_session(frame);
+    camera_frame_ = frame.frame_id;
     publisher_.set_feed(feed());
     if (paused_) {
       publisher_.on_frame(paused_output(frame));
@@ -102,6 +105,7 @@ class VoProcess {
     feed.last_command_id = commands_.last_id();
     feed.last_command_result = commands_.last_result();
     feed.latency_origin_ns = source_.latency_origin_ns();
+    feed.camera_frame = camera_frame_;
     return feed;
   }
 
@@ -162,6 +166,7 @@ class VoProcess {
   bool paused_ = false;
   int taken_ = 0;
   std::optional<LastFrame> last_;
+  std::string camera_frame_;
   Clock::time_point last_frame_;
   std::uint64_t reported_failures_ = 0;
 };

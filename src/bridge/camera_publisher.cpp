@@ -32,8 +32,12 @@ Result<CameraPublisher> CameraPublisher::open(const Participant& participant,
       Writer<msg::TFMessage>::open(participant, topics::kTfStatic, topics::kTfStaticQos);
   if (!tf_static) return tf_static.failure();
   const std::string camera = camera_name(cameras.rig.name);
+  const std::string left_frame = participant.frame(camera + "_left_camera_optical_frame");
+  auto views = CameraViews::open(participant, cameras, left_frame,
+                                 participant.frame(camera + "_right_camera_optical_frame"));
+  if (!views) return views.failure();
   CameraPublisher publisher(std::move(*stereo), std::move(*calibration), std::move(*tf_static),
-                            participant.frame(camera + "_left_camera_optical_frame"));
+                            std::move(*views), left_frame);
   const auto done = publisher.publish_static(participant, cameras, camera, stamp_ns);
   if (!done) return done.failure();
   return publisher;
@@ -67,7 +71,9 @@ Result<void> CameraPublisher::publish_static(const Participant& participant,
 Result<void> CameraPublisher::publish(const StereoFrame& frame) {
   msg::StereoFrame message = to_message(frame);
   if (frame.frame_id.empty()) message.header.frame_id = borrow(left_frame_);
-  return stereo_.write(message);
+  auto written = stereo_.write(message);
+  views_->offer(frame);
+  return written;
 }
 
 }  // namespace sovo::bridge

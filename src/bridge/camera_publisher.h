@@ -4,13 +4,15 @@
 #include <string>
 
 #include "sovo/bridge/calibration_conversion.h"
+#include "sovo/bridge/camera_views.h"
 #include "sovo/bridge/participant.h"
 #include "sovo/bridge/writer.h"
 #include "sovo/image/stereo_frame.h"
 
 namespace sovo::bridge {
 
-/// What a camera process publishes: `stereo`, and latched `calibration` and `/tf_static`.
+/// What a camera process publishes: `stereo`, latched `calibration` and `/tf_static`, and the
+/// images of both sides for those who want them (CameraViews).
 ///
 ///     auto publisher = CameraPublisher::open(participant, cameras, stamp_ns);
 ///     publisher->publish(frame);
@@ -29,15 +31,18 @@ class CameraPublisher {
 
   /// Left optical frame, e.g. "cam_left_camera_optical_frame".
   const std::string& left_optical_frame() const { return left_frame_; }
+  ViewCounters view_counters() const { return views_->counters(); }
   /// Odometry processes and others that listen now.
   std::uint32_t num_readers() const { return stereo_.num_readers(); }
 
  private:
   CameraPublisher(Writer<msg::StereoFrame> stereo, Writer<msg::StereoCalibration> calibration,
-                  Writer<msg::TFMessage> tf_static, std::string left_frame)
+                  Writer<msg::TFMessage> tf_static, std::unique_ptr<CameraViews> views,
+                  std::string left_frame)
       : stereo_(std::move(stereo)),
         calibration_(std::move(calibration)),
         tf_static_(std::move(tf_static)),
+        views_(std::move(views)),
         left_frame_(std::move(left_frame)) {}
 
   Result<void> publish_static(const Participant& participant, const StereoCameras& cameras,
@@ -46,6 +51,7 @@ class CameraPublisher {
   Writer<msg::StereoFrame> stereo_;
   Writer<msg::StereoCalibration> calibration_;
   Writer<msg::TFMessage> tf_static_;
+  std::unique_ptr<CameraViews> views_;
   std::string left_frame_;
 };
 

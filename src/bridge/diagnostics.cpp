@@ -4,19 +4,26 @@
 #include "sovo/bridge/ros_conversion.h"
 
 namespace sovo::bridge {
+namespace {
+
+using Level = MessageTraits<msg::DiagnosticStatus>;
+
+}  // namespace
 
 std::uint8_t diagnostic_level(OdometryState state) {
-  using Level = MessageTraits<msg::DiagnosticStatus>;
   if (state == OdometryState::kTracking) return Level::OK;
   return state == OdometryState::kLost ? Level::ERROR : Level::WARN;
 }
 
-DiagnosticsMessage::DiagnosticsMessage(const std::string& process_name,
-                                       const OdometryOutput& output, const FeedStatus& feed,
-                                       std::int64_t now_ns)
-    : name_(process_name), text_(to_string(output.state)) {
-  if (!output.reason.empty()) text_ += ": " + output.reason;
-  values_ = {
+DiagnosticReport describe(const std::string& process_name, const OdometryOutput& output,
+                          const FeedStatus& feed, bool stale) {
+  DiagnosticReport report;
+  report.name = process_name;
+  report.level = stale ? std::uint8_t{Level::STALE} : diagnostic_level(output.state);
+  report.text = stale ? "no frames come; last state " : "";
+  report.text += to_string(output.state);
+  if (!output.reason.empty()) report.text += ": " + output.reason;
+  report.values = {
       {"received", std::to_string(output.received)},
       {"lost_transport", std::to_string(feed.lost_transport)},
       {"dropped_queue", std::to_string(output.dropped_queue + feed.dropped_queue)},
@@ -32,12 +39,19 @@ DiagnosticsMessage::DiagnosticsMessage(const std::string& process_name,
       {"scale_verdict", to_string(output.scale_verdict)},
       {"distance_m", std::to_string(output.distance_m)},
   };
-  for (const auto& [key, value] : values_) key_values_.push_back({borrow(key), borrow(value)});
+  return report;
+}
+
+DiagnosticsMessage::DiagnosticsMessage(DiagnosticReport report, std::int64_t now_ns)
+    : report_(std::move(report)) {
+  for (const auto& [key, value] : report_.values) {
+    key_values_.push_back({borrow(key), borrow(value)});
+  }
   msg::DiagnosticStatus status{};
-  status.level = diagnostic_level(output.state);
-  status.name = borrow(name_);
-  status.message = borrow(text_);
-  status.hardware_id = borrow("");
+  status.level = report_.level;
+  status.name = borrow(report_.name);
+  status.message = borrow(report_.text);
+  status.hardware_id = borrow(report_.hardware_id);
   borrow(status.values, key_values_);
   status_.push_back(status);
   message_.header = {to_message(now_ns), borrow("")};

@@ -42,6 +42,7 @@ struct FeedStatus {
   std::uint64_t rejected = 0;        ///< Malformed, or of a second publisher.
   std::uint64_t last_command_id = 0;
   std::string last_command_result;
+  std::string camera_frame;  ///< Left optical frame, as the frames name it.
   /// Time that latency is counted from [ns, UTC]; 0: the frame's stamp.
   std::int64_t latency_origin_ns = 0;
 };

@@ -106,12 +106,6 @@ Pixels grey_pixels(const msg::SideImage& m, RowToGrey to_grey) {
   return grey;
 }
 
-/// A side whose data does not fit its size is written as missing rather than read beyond its end.
-bool fits(const SideImage& side) {
-  return side.valid && side.data && side.width > 0 && side.height > 0 && side.step > 0 &&
-         side.data->size() == static_cast<std::size_t>(side.step) * side.height;
-}
-
 msg::SideImage to_message(const SideImage& side) {
   msg::SideImage m{};
   m.encoding = borrow(side.format == PixelFormat::kMono16 ? "mono16" : "mono8");
@@ -119,7 +113,8 @@ msg::SideImage to_message(const SideImage& side) {
   m.gain_db = side.gain_db;
   m.stamp_offset_ns = side.stamp_offset_ns;
   m.dropped = side.dropped;
-  m.valid = fits(side);
+  // Data that does not fit the size is written as missing rather than read beyond its end.
+  m.valid = has_pixels(side);
   if (!m.valid) return m;
   m.width = static_cast<std::uint32_t>(side.width);
   m.height = static_cast<std::uint32_t>(side.height);
@@ -129,6 +124,13 @@ msg::SideImage to_message(const SideImage& side) {
 }
 
 }  // namespace
+
+bool has_pixels(const SideImage& side) {
+  const int bytes = side.format == PixelFormat::kMono16 ? 2 : 1;
+  return side.valid && side.data && side.width > 0 && side.height > 0 &&
+         side.step / bytes >= side.width &&
+         side.data->size() == static_cast<std::size_t>(side.step) * side.height;
+}
 
 msg::StereoFrame to_message(const StereoFrame& frame) {
   msg::StereoFrame m{};

@@ -9,6 +9,9 @@ namespace sovo::bridge {
 /// Largest width or height [px] of an image that is believed.
 inline constexpr std::uint32_t kLargestImage = 16384;
 
+/// Whether a side holds an image: valid, with as much data as its size says.
+bool has_pixels(const SideImage& side);
+
 /// Message of a frame; it borrows from `frame` (borrow.h): no pixel is copied.
 msg::StereoFrame to_message(const StereoFrame& frame);
 

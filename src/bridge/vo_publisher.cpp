@@ -5,25 +5,13 @@
 #include <vector>
 
 #include "sovo/bridge/borrow.h"
-#include "sovo/bridge/diagnostics.h"
 #include "sovo/bridge/ros_conversion.h"
 #include "sovo/bridge/topics.h"
 
 namespace sovo::bridge {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr std::size_t kLongestPath = 10'000;
-constexpr std::chrono::seconds kSlowPeriod(1);
-
-/// Whether a topic of 1 Hz is due; the first time it always is.
-bool due(Clock::time_point* last) {
-  const auto now = Clock::now();
-  if (*last != Clock::time_point() && now - *last < kSlowPeriod) return false;
-  *last = now;
-  return true;
-}
 
 template <class T>
 Result<void> open_into(std::optional<Writer<T>>* writer, const Participant& participant,
@@ -43,7 +31,6 @@ struct VoPublisher::Writers {
   std::optional<Writer<msg::Keyframe>> keyframe;
   std::optional<Writer<msg::Path>> path;
   std::optional<Writer<msg::TFMessage>> tf;  ///< Only with publish_tf.
-  std::optional<Writer<msg::DiagnosticArray>> diagnostics;
 };
 
 Result<std::unique_ptr<VoPublisher>> VoPublisher::open(const Participant& participant,
@@ -57,7 +44,6 @@ Result<std::unique_ptr<VoPublisher>> VoPublisher::open(const Participant& partic
       open_into(&writers->status, participant, topics::kStatus, topics::kStatusQos),
       open_into(&writers->keyframe, participant, topics::kKeyframe, topics::kKeyframeQos),
       open_into(&writers->path, participant, topics::kPath, topics::kPathQos),
-      open_into(&writers->diagnostics, participant, topics::kDiagnostics, topics::kDiagnosticsQos),
   };
   if (config.publish_tf) {
     opened.push_back(open_into(&writers->tf, participant, topics::kTf, topics::kTfQos));
@@ -68,8 +54,10 @@ Result<std::unique_ptr<VoPublisher>> VoPublisher::open(const Participant& partic
   publisher->config_ = config;
   publisher->T_base_left_ = T_base_left;
   publisher->frames_ = {participant.frame("odom"), participant.frame("base_link")};
-  publisher->process_name_ = participant.config().ns + ": visual odometry";
   publisher->writers_ = std::move(writers);
+  auto views = VoViews::open(participant, publisher->frames_, T_base_left, config.publish_odom);
+  if (!views) return views.failure();
+  publisher->views_ = std::move(*views);
   return publisher;
 }
 
@@ -102,7 +90,7 @@ void VoPublisher::on_frame(const OdometryOutput& output) {
   }
   const StatusMessage status(output, feed, timings_.times(), frames_, dds_time());
   check(writers_->status->write(status.message()));
-  if (due(&last_diagnostics_)) publish_diagnostics(output, feed);
+  views_->offer(output, feed);
 }
 
 void VoPublisher::publish_pose(const OdometryOutput& output) {
@@ -123,13 +111,9 @@ void VoPublisher::publish_transform(const OdometryOutput& output, const BaseMoti
   check(writers_->tf->write(message));
 }
 
-void VoPublisher::publish_diagnostics(const OdometryOutput& output, const FeedStatus& feed) {
-  const DiagnosticsMessage message(process_name_, output, feed, dds_time());
-  check(writers_->diagnostics->write(message.message()));
-}
-
 void VoPublisher::on_keyframe(const KeyframeOutput& keyframe) {
   check(writers_->keyframe->write(to_message(keyframe, T_base_left_, frames_)));
+  views_->offer(keyframe);
   if (keyframe.id == 0 && !keyframe.revised) path_.clear();  // another map begins
   if (keyframe.scale_valid && config_.publish_odom) publish_path(keyframe);
 }
@@ -137,7 +121,7 @@ void VoPublisher::on_keyframe(const KeyframeOutput& keyframe) {
 void VoPublisher::publish_path(const KeyframeOutput& keyframe) {
   path_.insert_or_assign(keyframe.id, to_path_pose(keyframe, T_base_left_, frames_));
   if (path_.size() > kLongestPath) path_.erase(path_.begin());
-  if (!due(&last_path_)) return;
+  if (!path_pace_.due()) return;
   std::vector<msg::PoseStamped> poses;
   poses.reserve(path_.size());
   for (const auto& [id, pose] : path_) poses.push_back(pose);

@@ -11,6 +11,7 @@
 #include "sovo/bridge/odometry_conversion.h"
 #include "sovo/bridge/participant.h"
 #include "sovo/bridge/stage_timings.h"
+#include "sovo/bridge/vo_views.h"
 #include "sovo/bridge/writer.h"
 
 namespace sovo::bridge {
@@ -26,7 +27,8 @@ struct VoPublisherConfig {
 };
 
 /// What an odometry process publishes: `odom`, `scaled_odometry`, `status`, `keyframe`, `path`
-/// (1 Hz), `/tf` and `/diagnostics` (1 Hz).
+/// (1 Hz) and `/tf`, and what is shown beside them (VoViews): `tracked_points`, `points` and
+/// `/diagnostics`.
 ///
 ///     auto publisher = VoPublisher::open(participant, config, rig.T_base_left);
 ///     StereoOdometry odometry(odometry_config, cameras, publisher->get(),
@@ -47,6 +49,12 @@ class VoPublisher : public OutputSink {
   /// Stages that are timed are told in `status`.
   StageTimings* timings() { return &timings_; }
 
+  /// `tracked_points` and `points` are silent before this. `tracked`: the undistorted camera
+  /// (StereoOdometry::tracked_camera); `raw_left`: as calibrated.
+  void set_cameras(const CameraModel& tracked, const CameraModel& raw_left) {
+    views_->set_cameras({tracked, raw_left});
+  }
+
   /// What is known about the feed, for the following frames; from any thread.
   void set_feed(const FeedStatus& feed);
 
@@ -57,6 +65,8 @@ class VoPublisher : public OutputSink {
   /// Writes that failed since the start, and what was wrong with the last.
   std::uint64_t failed_writes() const { return failed_writes_; }
   std::string last_failure() const;
+  /// Messages of `tracked_points` and `points` that were made.
+  std::uint64_t views_made() const { return views_->made(); }
 
  private:
   struct Writers;
@@ -65,15 +75,14 @@ class VoPublisher : public OutputSink {
 
   void publish_pose(const OdometryOutput& output);
   void publish_transform(const OdometryOutput& output, const BaseMotion& motion);
-  void publish_diagnostics(const OdometryOutput& output, const FeedStatus& feed);
   void publish_path(const KeyframeOutput& keyframe);
   void check(const Result<void>& written);
 
   VoPublisherConfig config_;
   SE3 T_base_left_;
   OdometryFrames frames_;
-  std::string process_name_;
   std::unique_ptr<Writers> writers_;
+  std::unique_ptr<VoViews> views_;
   StageTimings timings_;
 
   mutable std::mutex mutex_;  // of feed_ and failure_
@@ -82,8 +91,7 @@ class VoPublisher : public OutputSink {
 
   std::atomic<std::uint64_t> failed_writes_{0};
   std::map<std::uint32_t, msg::PoseStamped> path_;  // by keyframe; only on_keyframe uses it
-  std::chrono::steady_clock::time_point last_path_;
-  std::chrono::steady_clock::time_point last_diagnostics_;
+  Pace path_pace_{std::chrono::seconds(1)};
 };
 
 }  // namespace sovo::bridge

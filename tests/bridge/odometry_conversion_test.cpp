@@ -160,7 +160,7 @@ TEST(Diagnostics, LostIsAnErrorAndTrackingIsOk) {
   OdometryOutput output = test_output();
   output.state = OdometryState::kLost;
   output.reason = "too dark";
-  const DiagnosticsMessage message("sovo: visual odometry", output, {}, 0);
+  const DiagnosticsMessage message(describe("sovo: visual odometry", output, {}), 0);
   ASSERT_EQ(message.message().status._length, 1U);
   EXPECT_NE(std::string(message.message().status._buffer[0].message).find("too dark"),
             std::string::npos);

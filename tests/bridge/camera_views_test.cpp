@@ -1,0 +1,194 @@
+#include "sovo/bridge/camera_views.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "sovo/bridge/camera_publisher.h"
+#include "sovo/bridge/image_conversion.h"
+#include "sovo/bridge/reader.h"
+#include "sovo/bridge/ros_conversion.h"
+#include "sovo/bridge/topics.h"
+#include "sovo/io/image_codecs.h"
+#include "test_bus.h"
+#include "test_cameras.h"
+
+namespace sovo::bridge {
+namespace {
+
+/// A camera process that publishes the same picture again and again.
+struct Camera {
+  Participant participant = open_remote_participant();
+  CameraPublisher publisher = require(CameraPublisher::open(participant, test_cameras(), 0));
+  std::uint64_t sequence = 0;
+
+  void publish() {
+    const auto done = publisher.publish(test_frame(++sequence));
+    EXPECT_TRUE(done.ok()) << done.error();
+  }
+
+  /// Publishes until the reader has a message, and gives it to `look`.
+  template <class T, class F>
+  void show(Reader<T>& reader, F&& look) {
+    bool seen = false;
+    EXPECT_TRUE(eventually([&] {
+      publish();
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      const auto taken = reader.take_each([&](const T& m, const dds_sample_info_t&) {
+        if (!seen) look(m);
+        seen = true;
+      });
+      return taken.ok() && seen;
+    })) << reader.topic();
+  }
+};
+
+std::int64_t frame_stamp(std::uint64_t sequence) { return test_frame(sequence).stamp_ns; }
+
+/// Whether a stamp is that of a frame that was published.
+bool is_of_a_frame(const msg::Header& header, std::uint64_t newest) {
+  std::set<std::int64_t> stamps;
+  for (std::uint64_t i = 1; i <= newest; ++i) stamps.insert(frame_stamp(i));
+  return stamps.contains(stamp_ns(header.stamp));
+}
+
+TEST(CameraViews, NothingIsMadeWithoutAReader) {
+  Camera camera;
+  const Participant other = open_participant();
+  auto diagnostics = require(
+      Reader<msg::DiagnosticArray>::open(other, topics::kDiagnostics, topics::kDiagnosticsQos));
+  std::string frames;
+  std::string made;
+  // The report comes from the thread that would make them, after the frames before it.
+  EXPECT_TRUE(eventually([&] {
+    camera.publish();
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    const auto taken =
+        diagnostics.take_each([&](const msg::DiagnosticArray& m, const dds_sample_info_t&) {
+          const auto& values = m.status._buffer[0].values;
+          for (std::uint32_t i = 0; i < values._length; ++i) {
+            const std::string key = values._buffer[i].key;
+            if (key == "frames") frames = values._buffer[i].value;
+            if (key == "views_made") made = values._buffer[i].value;
+          }
+        });
+    return taken.ok() && !frames.empty() && std::stoi(frames) > 3;
+  }));
+  EXPECT_EQ(made, "0");
+  EXPECT_EQ(camera.publisher.view_counters().made, 0U);
+
+  auto raw = require(Reader<msg::Image>::open(other, "left/image_raw", topics::kImageQos));
+  camera.show(raw, [](const msg::Image&) {});
+  EXPECT_GT(camera.publisher.view_counters().made, 0U);
+}
+
+TEST(CameraViews, RawImagesAreTheFramesOwnPixels) {
+  Camera camera;
+  const Participant other = open_participant();
+  auto raw = require(Reader<msg::Image>::open(other, "right/image_raw", topics::kImageQos));
+  camera.show(raw, [&](const msg::Image& m) {
+    EXPECT_EQ(m.width, 640U);
+    EXPECT_EQ(m.height, 400U);
+    EXPECT_EQ(m.step, 640U);
+    EXPECT_STREQ(m.encoding, "mono8");
+    EXPECT_STREQ(m.header.frame_id, "cam_right_camera_optical_frame");
+    EXPECT_TRUE(is_of_a_frame(m.header, camera.sequence));
+    const SideImage sent = test_side(640, 400, 2);
+    ASSERT_EQ(m.data._length, sent.data->size());
+    EXPECT_TRUE(std::equal(sent.data->begin(), sent.data->end(), m.data._buffer));
+  });
+}
+
+TEST(CameraViews, PreviewsAreSmallJpegsWithTheStampOfTheirFrame) {
+  Camera camera;
+  const Participant other = open_participant();
+  struct Expected {
+    const char* topic;
+    int width, height;
+  };
+  for (const Expected& expected : {Expected{"left/preview/compressed", 640, 408},
+                                   Expected{"left/preview_small/compressed", 320, 204},
+                                   Expected{"left/image_raw/compressed", 752, 480},
+                                   Expected{"right/preview/compressed", 640, 400}}) {
+    auto reader =
+        require(Reader<msg::CompressedImage>::open(other, expected.topic, topics::kCompressedQos));
+    camera.show(reader, [&](const msg::CompressedImage& m) {
+      EXPECT_STREQ(m.format, "mono8; jpeg compressed mono8");
+      EXPECT_TRUE(is_of_a_frame(m.header, camera.sequence));
+      const auto decoded = codecs::decode_jpeg({m.data._buffer, m.data._length});
+      ASSERT_TRUE(decoded.ok()) << decoded.error();
+      EXPECT_EQ(decoded->width, expected.width);
+      EXPECT_EQ(decoded->height, expected.height);
+    });
+  }
+}
+
+TEST(CameraViews, CameraInfoIsThatOfRosWithTheBaselineInTheRightOne) {
+  Camera camera;
+  const Participant other = open_participant();
+  auto left = require(Reader<msg::CameraInfo>::open(other, "left/camera_info", topics::kImageQos));
+  auto right =
+      require(Reader<msg::CameraInfo>::open(other, "right/camera_info", topics::kImageQos));
+  double focal = 0.0;
+  double row = 0.0;
+  camera.show(left, [&](const msg::CameraInfo& m) {
+    EXPECT_STREQ(m.distortion_model, "plumb_bob");
+    ASSERT_EQ(m.d._length, 5U);
+    EXPECT_EQ(m.d._buffer[0], -0.28);
+    EXPECT_EQ(m.k[0], 458.6);
+    EXPECT_EQ(m.p[3], 0.0);
+    EXPECT_TRUE(is_of_a_frame(m.header, camera.sequence));
+    focal = m.p[0];
+    row = m.p[6];
+  });
+  camera.show(right, [&](const msg::CameraInfo& m) {
+    EXPECT_STREQ(m.distortion_model, "equidistant");
+    EXPECT_EQ(m.d._length, 4U);
+    EXPECT_EQ(m.p[0], focal);
+    EXPECT_EQ(m.p[6], row);
+    EXPECT_NEAR(m.p[3], -focal * test_cameras().rig.baseline(), 1e-9);
+    EXPECT_NEAR(m.p[7], 0.0, 1e-9);
+  });
+}
+
+TEST(CameraViews, RectifiedImagesHaveTheSizeOfTheRawOnes) {
+  Camera camera;
+  const Participant other = open_participant();
+  auto rect = require(Reader<msg::Image>::open(other, "left/image_rect", topics::kImageQos));
+  camera.show(rect, [&](const msg::Image& m) {
+    EXPECT_EQ(m.width, 752U);
+    EXPECT_EQ(m.height, 480U);
+    ASSERT_EQ(m.data._length, 752U * 480U);
+    EXPECT_NE(m.data._buffer[240 * 752 + 376], 0);
+  });
+}
+
+TEST(ImageConversion, ReducingGivesTheMeansOfBlocks) {
+  const std::vector<std::uint8_t> pixels = {10, 20, 100, 100, 9, 30, 40, 100, 100, 9};
+  std::vector<std::uint8_t> storage;
+  const GreyView small = reduced({pixels.data(), 4, 2, 5}, 2, &storage);
+  EXPECT_EQ(small.width, 2);
+  EXPECT_EQ(small.height, 1);
+  EXPECT_EQ(small.data[0], 25);
+  EXPECT_EQ(small.data[1], 100);
+  EXPECT_EQ(reduced({pixels.data(), 4, 2, 5}, 8, &storage).data, pixels.data());
+}
+
+TEST(ImageConversion, SixteenBitsBecomeTheirUpperEight) {
+  SideImage side;
+  side.valid = true;
+  side.format = PixelFormat::kMono16;
+  side.width = 2;
+  side.height = 1;
+  side.step = 6;
+  side.data = std::make_shared<std::vector<std::uint8_t>>(
+      std::vector<std::uint8_t>{0xFF, 0x12, 0x00, 0xFE, 7, 7});
+  std::vector<std::uint8_t> storage;
+  const GreyView grey = grey_view(side, &storage);
+  EXPECT_EQ(grey.step, 2);
+  EXPECT_EQ(grey.data[0], 0x12);
+  EXPECT_EQ(grey.data[1], 0xFE);
+}
+
+}  // namespace
+}  // namespace sovo::bridge

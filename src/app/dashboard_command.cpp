@@ -47,8 +47,9 @@ Result<std::vector<int>> parse_domains(const std::string& text) {
 /// "ADDRESS:PORT", "[ADDRESS]:PORT" or ":PORT" for loopback.
 Result<void> parse_listen(const std::string& text, bridge::WebServerConfig* web) {
   const auto colon = text.rfind(':');
-  const auto port = colon == std::string::npos ? std::nullopt
-                                               : parse_number<std::uint16_t>(text.substr(colon + 1));
+  const auto port = colon == std::string::npos
+                        ? std::nullopt
+                        : parse_number<std::uint16_t>(text.substr(colon + 1));
   if (!port) return Error{"--listen is '" + text + "': give ADDRESS:PORT, as 127.0.0.1:8765"};
   std::string address = text.substr(0, colon);
   if (address.starts_with('[') && address.ends_with(']')) {
@@ -96,19 +97,21 @@ std::string address_of(const bridge::DashboardServerConfig& config, std::uint16_
   const bool any = config.web.address == "0.0.0.0" || config.web.address == "::";
   std::string host = any ? "localhost" : config.web.address;
   if (host.find(':') != std::string::npos) host = "[" + host + "]";
-  return (config.web.tls_cert.empty() ? "http://" : "https://") + host + ":" + std::to_string(port) +
-         "/";
+  return (config.web.tls_cert.empty() ? "http://" : "https://") + host + ":" +
+         std::to_string(port) + "/";
 }
 
 void log_start(const bridge::DashboardServerConfig& config, const bridge::DashboardServer& server) {
   if (!server.has_page()) {
-    spdlog::warn("the web page was not built with this program: install nodejs and npm, then run "
-                 "scripts/build; Foxglove can connect all the same");
+    spdlog::warn(
+        "the web page was not built with this program: install nodejs and npm, then run "
+        "scripts/build; Foxglove can connect all the same");
   }
   if (!bridge::is_loopback_address(config.web.address) && config.web.tls_cert.empty()) {
-    spdlog::warn("NOT ENCRYPTED: on {} everybody on the network can read along, the token too; "
-                 "give --tls-cert and --tls-key",
-                 config.web.address);
+    spdlog::warn(
+        "NOT ENCRYPTED: on {} everybody on the network can read along, the token too; "
+        "give --tls-cert and --tls-key",
+        config.web.address);
   }
   const std::string address = address_of(config, server.port());
   spdlog::info("dashboard: {}{}", address,

@@ -108,7 +108,7 @@ export class Vehicle {
   readonly statusTable = new Table(kStatusColumns, kRows);
   readonly keyframes = new Map<string, KeyframeMark>();
   keyframeRevision = 0;
-  readonly map = new VoxelMap();
+  readonly map: VoxelMap;
   windowPoints = new Float32Array(0);
   windowRevision = 0;
   readonly left = new PictureFeed();
@@ -133,7 +133,9 @@ export class Vehicle {
   constructor(
     private readonly link: Connection,
     readonly ns: string,
+    mostMapPoints: number,
   ) {
+    this.map = new VoxelMap(mostMapPoints);
     this.hear("status", (m: VoStatus) => this.addStatus(m));
     this.hear("scaled_odometry", (m: ScaledOdometry) => this.addPose(m));
     this.hear("keyframe", (m: Keyframe) => this.addKeyframe(m));

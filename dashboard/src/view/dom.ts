@@ -21,6 +21,18 @@ export function button(label: string, title: string, use: () => void): HTMLButto
   return node;
 }
 
+/** A line drawing of 24 by 24. */
+export function icon(path: string): SVGSVGElement {
+  const kSvg = "http://www.w3.org/2000/svg";
+  const svg = document.createElementNS(kSvg, "svg");
+  svg.setAttribute("viewBox", "0 0 24 24");
+  svg.setAttribute("class", "icon");
+  const line = document.createElementNS(kSvg, "path");
+  line.setAttribute("d", path);
+  svg.append(line);
+  return svg;
+}
+
 /** Value of a custom property of the page's theme. */
 export function themeColor(name: string): string {
   return getComputedStyle(document.documentElement).getPropertyValue(name).trim();

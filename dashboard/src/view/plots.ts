@@ -206,7 +206,7 @@ class Plot {
       scales: { x: { time: false, auto: false }, y: { range: (_, low, high) => span(low, high, spec) } },
       axes: [
         { ...axis, show: false },
-        { ...axis, size: 44, gap: 4, splits: (_u, _i, low, high) => [low + 0.12 * (high - low), high - 0.12 * (high - low)], values: (_u, splits) => splits.map(short) },
+        { ...axis, size: 46, gap: 5, space: 20, values: (_u, splits) => splits.map(short) },
       ],
       bands: spec.band
         ? [{ series: [3, 2], fill: alpha(themeColor(spec.curves[0]!.color), 0.2) }]
@@ -297,11 +297,9 @@ function span(low: number | null, high: number | null, spec: Spec): [number, num
   return [spec.zero && a === 0 ? 0 : a - margin, b + margin];
 }
 
+/** A tick's number without the noise of binary fractions. */
 function short(value: number): string {
-  const size = Math.abs(value);
-  if (size >= 100) return value.toFixed(0);
-  if (size >= 10) return value.toFixed(1);
-  return size >= 1 ? value.toFixed(2) : value.toFixed(3);
+  return String(Number(value.toPrecision(5))).replace("-", "−");
 }
 
 function alpha(color: string, opacity: number): string {

@@ -36,6 +36,8 @@ export type ViewName = "orbit" | "follow" | "top" | "side";
 export type LayerName = "trajectory" | "map" | "points" | "keyframes" | "grid" | "picture";
 
 const kFrameMs = 1000 / 30;
+/** With many keyframes, their marks are made anew this often at most. */
+const kKeyframesMs = 1000;
 
 /** The room that the vehicle moves in. */
 export class SceneView {
@@ -55,7 +57,7 @@ export class SceneView {
   private readonly pathLine = new GrowingLine(1.5, 0.5);
   private readonly otherLine = new GrowingLine(2, 0.9);
   private readonly marker = new CameraMarker();
-  private readonly keyframes = new KeyframeMarkers();
+  private readonly keyframes: KeyframeMarkers;
   private readonly grid = new GroundGrid();
   private readonly window: Points<BufferGeometry, PointsMaterial>;
   private readonly plumb: Line<BufferGeometry, LineDashedMaterial>;
@@ -71,6 +73,11 @@ export class SceneView {
   private drawnRevision = -1;
   private drawnKeyframes = -1;
   private drawnKeyframeSize = 0;
+  private keyframesAt = 0;
+  private stateColors: Color[] = [];
+  private drawMs = 0;
+  private lastTick = 0;
+  private drewLast = false;
   private drawnWindow = -1;
   private drawnPath: unknown;
   private drawnCalibration: unknown;
@@ -84,13 +91,13 @@ export class SceneView {
   private readonly followed = new Vector3();
   private frames: number[] = [];
 
-  constructor(private readonly host: HTMLElement) {
-    this.renderer = new WebGLRenderer({
-      canvas: this.canvas,
-      antialias: true,
-      preserveDrawingBuffer: true,
-    });
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
+  constructor(
+    private readonly host: HTMLElement,
+    software: boolean,
+  ) {
+    this.renderer = new WebGLRenderer({ canvas: this.canvas, antialias: !software });
+    this.renderer.setPixelRatio(software ? 1 : Math.min(window.devicePixelRatio, 2));
+    this.keyframes = new KeyframeMarkers(software ? 150 : 1500);
     host.prepend(this.canvas);
     host.append(this.rulerLabel);
     this.rulerLabel.hidden = true;
@@ -217,10 +224,11 @@ export class SceneView {
   }
 
   applyTheme(): void {
+    this.stateColors = kStates.map((s) => new Color(themeColor(s.color)));
     this.scene.background = new Color(themeColor("--scene"));
     this.grid.setColors(themeColor("--grid"), themeColor("--grid-strong"));
     this.window.material.color.set(themeColor("--amber"));
-    this.keyframes.object.material.color.set(themeColor("--dim"));
+    this.keyframes.setColor(themeColor("--dim"));
     this.plumb.material.color.set(themeColor("--faint"));
     this.rulerLine.material.color.set(themeColor("--amber"));
     this.cloud?.redraw();
@@ -324,8 +332,16 @@ export class SceneView {
 
   private tick(now: number): void {
     requestAnimationFrame((t) => this.tick(t));
-    if (!this.dirty || now - this.lastFrame < kFrameMs - 4) return;
+    const gap = now - this.lastTick;
+    this.lastTick = now;
+    // A slow frame delays the next: that is what drawing costs, whoever does it.
+    if (this.drewLast) this.drawMs = 0.7 * this.drawMs + 0.3 * (gap < 40 ? 4 : Math.min(gap, 2000));
+    this.drewLast = false;
+    // Drawing may take half of the time, so that the page stays at hand.
+    const pause = Math.max(kFrameMs - 4, 2 * this.drawMs);
+    if (!this.dirty || now - this.lastFrame < pause) return;
     this.lastFrame = now;
+    this.drewLast = true;
     this.draw();
     this.frames.push(now);
     while (this.frames.length > 0 && this.frames[0]! < now - 2000) this.frames.shift();
@@ -355,7 +371,7 @@ export class SceneView {
       this.drawnPoses = 0;
       this.lastSegment = -1;
     }
-    const colors = kStates.map((s) => new Color(themeColor(s.color)));
+    const colors = this.stateColors;
     for (; this.drawnPoses < poses.length; ++this.drawnPoses) {
       const i = this.drawnPoses;
       const p = new Vector3(poses.x(i), poses.y(i), poses.z(i));
@@ -413,7 +429,7 @@ export class SceneView {
       position: { x, y, z },
       orientation: { x: qx, y: qy, z: qz, w: qw },
     });
-    this.marker.setColor(new Color(themeColor(kStates[vehicle.poses.state(i)]?.color ?? "--grey")));
+    this.marker.setColor(this.stateColors[vehicle.poses.state(i)] ?? this.stateColors[6]!);
     const picture = this.marker.object.userData.noPicture ? undefined : vehicle.left.at(time);
     this.marker.setPicture(picture?.bitmap);
     this.plumb.geometry.setFromPoints([new Vector3(x, y, z), new Vector3(x, y, this.ground)]);
@@ -431,10 +447,12 @@ export class SceneView {
     const size = Math.min(Math.max(this.metresPerPixel * 9, 0.02), 5);
     const resized = size > 1.4 * this.drawnKeyframeSize || size < 0.7 * this.drawnKeyframeSize;
     if (this.drawnKeyframes === vehicle.keyframeRevision && !resized) return;
+    const now = performance.now();
+    if (vehicle.keyframes.size > 300 && now - this.keyframesAt < kKeyframesMs) return;
+    this.keyframesAt = now;
     this.drawnKeyframes = vehicle.keyframeRevision;
     this.drawnKeyframeSize = size;
-    const marks = vehicle.keyframes;
-    this.keyframes.update(marks.values(), marks.size, viewCorners(vehicle.calibration), size);
+    this.keyframes.update(vehicle.keyframes, viewCorners(vehicle.calibration), size);
   }
 
   private updatePoints(vehicle: Vehicle): void {

@@ -111,41 +111,62 @@ export class CameraMarker {
   }
 }
 
-/** A small view pyramid for every keyframe. */
+/** The newest keyframes as small view pyramids, all older ones as dots. */
 export class KeyframeMarkers {
-  readonly object: LineSegments<BufferGeometry, LineBasicMaterial>;
+  readonly object = new Group();
+  private readonly pyramids = new LineSegments(
+    new BufferGeometry(),
+    new LineBasicMaterial({ transparent: true, opacity: 0.6 }),
+  );
+  private readonly dots = new Points(
+    new BufferGeometry(),
+    new PointsMaterial({ size: 3, sizeAttenuation: false, transparent: true, opacity: 0.8 }),
+  );
 
-  constructor() {
-    this.object = new LineSegments(
-      new BufferGeometry(),
-      new LineBasicMaterial({ transparent: true, opacity: 0.55 }),
-    );
-    this.object.frustumCulled = false;
+  constructor(private readonly mostPyramids: number) {
+    this.pyramids.frustumCulled = this.dots.frustumCulled = false;
+    this.object.add(this.dots, this.pyramids);
   }
 
-  /** `marks`: poses of the left camera. */
-  update(marks: Iterable<KeyframeMark>, count: number, corners: Vector3[], size: number): void {
-    const positions = new Float32Array(count * 48);
+  setColor(color: string): void {
+    this.pyramids.material.color.set(color);
+    this.dots.material.color.set(color);
+  }
+
+  /** `marks`: poses of the left camera, oldest first. */
+  update(marks: Map<string, KeyframeMark>, corners: Vector3[], size: number): void {
+    const numDots = Math.max(0, marks.size - this.mostPyramids);
+    const dots = new Float32Array(3 * numDots);
+    const lines = new Float32Array(48 * (marks.size - numDots));
     const q = new Quaternion();
     const p = new Vector3();
     const c = corners.map(() => new Vector3());
-    let at = 0;
-    for (const mark of marks) {
-      p.copy(mark.pose.position as Vector3);
-      q.copy(mark.pose.orientation as Quaternion);
-      corners.forEach((corner, i) => {
-        c[i]!.copy(corner).multiplyScalar(size).applyQuaternion(q).add(p);
+    let [i, at] = [0, 0];
+    for (const { pose } of marks.values()) {
+      const { x, y, z } = pose.position;
+      if (i < numDots) dots.set([x, y, z], 3 * i);
+      i += 1;
+      if (i <= numDots) continue;
+      p.set(x, y, z);
+      q.copy(pose.orientation as Quaternion);
+      corners.forEach((corner, k) => {
+        c[k]!.copy(corner).multiplyScalar(size).applyQuaternion(q).add(p);
       });
-      for (let i = 0; i < 4; ++i) {
-        const [a, b] = [c[i]!, c[(i + 1) % 4]!];
-        positions.set([p.x, p.y, p.z, a.x, a.y, a.z, a.x, a.y, a.z, b.x, b.y, b.z], at);
+      for (let k = 0; k < 4; ++k) {
+        const [a, b] = [c[k]!, c[(k + 1) % 4]!];
+        lines.set([x, y, z, a.x, a.y, a.z, a.x, a.y, a.z, b.x, b.y, b.z], at);
         at += 12;
       }
     }
-    this.object.geometry.dispose();
-    this.object.geometry = new BufferGeometry();
-    this.object.geometry.setAttribute("position", new BufferAttribute(positions, 3));
+    setPositions(this.dots, dots);
+    setPositions(this.pyramids, lines);
   }
+}
+
+function setPositions(object: { geometry: BufferGeometry }, positions: Float32Array): void {
+  object.geometry.dispose();
+  object.geometry = new BufferGeometry();
+  object.geometry.setAttribute("position", new BufferAttribute(positions, 3));
 }
 
 /** The accumulated map, in the grey levels of the pictures. */
@@ -233,13 +254,7 @@ export class GroundGrid {
       const [gx, gy] = [cx + i * this.step, cy + i * this.step];
       out.push(gx, cy - reach, z, gx, cy + reach, z, cx - reach, gy, z, cx + reach, gy, z);
     }
-    this.set(this.fine, fine);
-    this.set(this.strong, strong);
-  }
-
-  private set(lines: LineSegments, positions: number[]): void {
-    lines.geometry.dispose();
-    lines.geometry = new BufferGeometry();
-    lines.geometry.setAttribute("position", new BufferAttribute(new Float32Array(positions), 3));
+    setPositions(this.fine, new Float32Array(fine));
+    setPositions(this.strong, new Float32Array(strong));
   }
 }

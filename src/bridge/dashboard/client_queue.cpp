@@ -23,9 +23,9 @@ void ClientQueue::drop(std::deque<QueuedMessage>::iterator at) {
 
 bool ClientQueue::make_room(std::size_t bytes, Importance importance) {
   while (bytes_ + bytes > max_bytes_) {
-    const auto least = std::min_element(
-        messages_.begin(), messages_.end(),
-        [](const auto& a, const auto& b) { return a.importance < b.importance; });
+    const auto least =
+        std::min_element(messages_.begin(), messages_.end(),
+                         [](const auto& a, const auto& b) { return a.importance < b.importance; });
     if (least == messages_.end() || least->importance > importance) return false;
     drop(least);
   }

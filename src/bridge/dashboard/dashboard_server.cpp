@@ -153,8 +153,9 @@ std::variant<WebUpgrade, WebResponse> DashboardServer::upgrade(const WebRequest&
   if (auto refused = refusal(request)) return std::move(*refused);
   const auto subprotocol = foxglove::choose_subprotocol(request.subprotocols);
   if (!subprotocol) {
-    return plain(400, "this WebSocket speaks the subprotocols foxglove.sdk.v1 and "
-                      "foxglove.websocket.v1\n");
+    return plain(400,
+                 "this WebSocket speaks the subprotocols foxglove.sdk.v1 and "
+                 "foxglove.websocket.v1\n");
   }
   return WebUpgrade{*subprotocol, hub_.make_client()};
 }

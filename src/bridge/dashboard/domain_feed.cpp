@@ -26,8 +26,8 @@ TopicQos qos_for(const dds_qos_t* offered, const std::string& topic) {
   dds_duration_t ignored = 0;
   dds_qget_durability(offered, &durability);
   dds_qget_reliability(offered, &reliability, &ignored);
-  TopicQos qos = durability == DDS_DURABILITY_VOLATILE ? reliable(10)
-                                                       : latched(latched_depth_of(topic));
+  TopicQos qos =
+      durability == DDS_DURABILITY_VOLATILE ? reliable(10) : latched(latched_depth_of(topic));
   qos.best_effort = reliability == DDS_RELIABILITY_BEST_EFFORT;
   return qos;
 }
@@ -38,8 +38,7 @@ Result<std::unique_ptr<DomainFeed>> DomainFeed::open(const DdsConfig& config,
                                                      const std::string& prefix, Ids ids) {
   auto participant = Participant::open(config, "dashboard");
   if (!participant) return participant.failure();
-  std::unique_ptr<DomainFeed> feed(
-      new DomainFeed(std::move(*participant), prefix, std::move(ids)));
+  std::unique_ptr<DomainFeed> feed(new DomainFeed(std::move(*participant), prefix, std::move(ids)));
   if (auto done = feed->open_discovery(); !done) return done.failure();
   return feed;
 }
@@ -197,9 +196,10 @@ void DomainFeed::forward() {
 Result<void> DomainFeed::prepare(const std::string& topic, const std::string& type) {
   const MessageSchema* schema = find_schema(type);
   if (schema == nullptr || !is_command(topic, type)) {
-    return Error{"only commands can be published: command (sovo_msgs/msg/VoCommand) and "
-                 "record_command (sovo_msgs/msg/RecorderCommand) of a namespace, not " +
-                 topic};
+    return Error{
+        "only commands can be published: command (sovo_msgs/msg/VoCommand) and "
+        "record_command (sovo_msgs/msg/RecorderCommand) of a namespace, not " +
+        topic};
   }
   const std::lock_guard lock(mutex_);
   if (commands_.count(topic) != 0) return {};

@@ -70,8 +70,8 @@ Result<ClientText> parse_advertise(const json& object) {
     if (!item.is_object()) return malformed("advertise");
     const auto id = number(item, "id");
     if (!id) return malformed("advertise");
-    result.items.push_back({*id, text(item, "topic"), text(item, "encoding"),
-                            text(item, "schemaName")});
+    result.items.push_back(
+        {*id, text(item, "topic"), text(item, "encoding"), text(item, "schemaName")});
   }
   return ClientText(std::move(result));
 }

@@ -66,8 +66,8 @@ void VehicleMetrics::add(const Participant& participant, const std::string& ns) 
   const std::lock_guard lock(mutex_);
   if (vehicles_.count(ns) != 0 || vehicles_.size() >= kMostVehicles) return;
   auto statuses = Reader<msg::VoStatus>::open(participant, ns + "/" + topics::kStatus, reliable(1));
-  auto poses = Reader<msg::ScaledOdometry>::open(
-      participant, ns + "/" + topics::kScaledOdometry, reliable(1));
+  auto poses = Reader<msg::ScaledOdometry>::open(participant, ns + "/" + topics::kScaledOdometry,
+                                                 reliable(1));
   if (!statuses || !poses) return;
   vehicles_[ns] = std::make_unique<Vehicle>(std::move(*statuses), std::move(*poses));
 }

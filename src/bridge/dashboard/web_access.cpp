@@ -118,8 +118,8 @@ bool equal_in_constant_time(std::string_view given, std::string_view secret) {
   unsigned char difference = given.size() == secret.size() ? 0 : 1;
   for (std::size_t i = 0; i < given.size(); ++i) {
     const unsigned char expected = static_cast<unsigned char>(secret[i % secret.size()]);
-    difference = static_cast<unsigned char>(
-        difference | (static_cast<unsigned char>(given[i]) ^ expected));
+    difference =
+        static_cast<unsigned char>(difference | (static_cast<unsigned char>(given[i]) ^ expected));
   }
   return difference == 0;
 }

@@ -37,9 +37,9 @@ class AccessRules {
  public:
   explicit AccessRules(AccessConfig config);
 
-  /// Why this request comes from where it must not; nothing when it is fine. Host must be an address
-  /// or a name of this machine, for a name that somebody else owns can be made to point here; Origin
-  /// must be absent, the server's own, or allowed.
+  /// Why this request comes from where it must not; nothing when it is fine. Host must be an
+  /// address or a name of this machine, for a name that somebody else owns can be made to point
+  /// here; Origin must be absent, the server's own, or allowed.
   std::optional<std::string> refusal(const WebRequest& request) const;
 
   /// Whether the request carries the token, as `?token=`, bearer or session cookie, or none is

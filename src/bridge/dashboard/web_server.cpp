@@ -230,9 +230,8 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
     if (!websocket::is_upgrade(request)) return write(context_.handler.respond(asked));
     auto decision = context_.handler.upgrade(asked);
     if (auto* refusal = std::get_if<WebResponse>(&decision)) return write(std::move(*refusal));
-    std::make_shared<WebSocketConnection<Stream>>(std::move(stream_), context_,
-                                                  std::get<WebUpgrade>(std::move(decision)),
-                                                  std::move(count_))
+    std::make_shared<WebSocketConnection<Stream>>(
+        std::move(stream_), context_, std::get<WebUpgrade>(std::move(decision)), std::move(count_))
         ->start(request);
   }
 
@@ -283,7 +282,8 @@ class WebServer::Impl {
     const std::string name = config.address == "localhost" ? "127.0.0.1" : config.address;
     const auto address = asio::ip::make_address(name, error);
     if (error) {
-      return Error{"'" + config.address + "' is no address; give one of this machine's, or 0.0.0.0"};
+      return Error{"'" + config.address +
+                   "' is no address; give one of this machine's, or 0.0.0.0"};
     }
     const tcp::endpoint endpoint(address, config.port);
     acceptor_.open(endpoint.protocol(), error);

@@ -95,6 +95,28 @@ struct NodeSection {
   }
 };
 
+/// Who may look at the dashboard, and where.
+struct DashboardSection {
+  std::string listen = "127.0.0.1:8765";
+  std::string domains;
+  std::string token_file;
+  std::string tls_cert;
+  std::string tls_key;
+  std::string allow_origin;
+  bool allow_commands = false;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("listen", listen, "address and port of the web page and of Foxglove's protocol");
+    v("domains", domains, "DDS domains that are shown, with commas; empty: the one of dds.domain");
+    v("token_file", token_file, "file, mode 0600, with the token that clients must know");
+    v("tls_cert", tls_cert, "PEM file of the certificate; empty: no TLS");
+    v("tls_key", tls_key, "PEM file of the certificate's key");
+    v("allow_origin", allow_origin, "web sites whose pages may connect, with commas");
+    v("allow_commands", allow_commands, "let clients with the token give commands");
+  }
+};
+
 /// The configuration of all processes: one file, a section each.
 struct AppConfig {
   Preset preset = Preset::kDefault;
@@ -104,6 +126,7 @@ struct AppConfig {
   sim::SimConfig sim;
   OutputSection output;
   NodeSection node;
+  DashboardSection dashboard;
   bridge::DdsConfig dds;
 
   template <class Visitor>
@@ -115,6 +138,7 @@ struct AppConfig {
     v("sim", sim, "simulated cameras");
     v("output", output, "files that a run leaves");
     v("node", node, "what only a process on the bus has");
+    v("dashboard", dashboard, "web page and Foxglove port");
     v("dds", dds, "how processes find each other");
   }
 };

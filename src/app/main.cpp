@@ -33,6 +33,7 @@ int run(int argc, char** argv) {
   add_status_command(root);
   add_topic_command(root);
   add_command_command(root);
+  add_dashboard_command(root);
   add_eval_command(root);
   add_bench_command(root);
   add_calib_command(root);

@@ -27,7 +27,7 @@ using Clock = std::chrono::steady_clock;
 using Json = nlohmann::ordered_json;
 
 constexpr std::chrono::seconds kPatience(5);
-constexpr std::chrono::milliseconds kSlice(100);
+constexpr std::chrono::milliseconds kTopicSlice(100);
 
 struct TopicOptions {
   std::string name;
@@ -67,7 +67,7 @@ int list(const AppConfig& config, const TopicOptions& options) {
   if (!ear) return fail(kFailed, ear.error());
   // Participants tell of themselves as soon as they hear of a new one.
   const auto end = Clock::now() + std::chrono::milliseconds(1500);
-  while (Clock::now() < end && !stop.requested()) std::this_thread::sleep_for(kSlice);
+  while (Clock::now() < end && !stop.requested()) std::this_thread::sleep_for(kTopicSlice);
   const auto topics = ear->discovery.topics();
   if (!topics) return fail(kFailed, topics.error());
   if (!options.json) {
@@ -93,7 +93,7 @@ Result<bridge::DiscoveredTopic> find(const Ear& ear, const std::string& name, St
     for (const auto& topic : *topics) {
       if (topic.name == name && topic.writers > 0) return topic;
     }
-    std::this_thread::sleep_for(kSlice);
+    std::this_thread::sleep_for(kTopicSlice);
   }
   return Error{"nobody writes " + name + "; sovo topic list shows what there is"};
 }
@@ -127,7 +127,7 @@ int follow(const AppConfig& config, const TopicOptions& options, TopicUser& user
   if (!reader) return fail(kFailed, reader.error());
   auto last = Clock::now();
   while (!stop.requested() && !user.is_done()) {
-    reader->wait(kSlice);
+    reader->wait(kTopicSlice);
     Result<void> used;
     const auto taken = reader->take_each([&](const bridge::CdrSample& sample, const auto&) {
       if (used && !user.is_done()) used = user.take(sample);

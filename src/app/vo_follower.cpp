@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint64_t kMostAhead = 2;
 constexpr std::chrono::seconds kVoPatience(5);
-constexpr std::chrono::milliseconds kSlice(50);
+constexpr std::chrono::milliseconds kFollowSlice(50);
 
 }  // namespace
 
@@ -37,7 +37,7 @@ void VoFollower::wait_before(std::uint64_t sequence, const std::function<bool()>
   if (sequence < kMostAhead || free_running_) return;
   auto last_progress = Clock::now();
   while (!is_done(sequence - kMostAhead) && !stop()) {
-    reader_.wait(kSlice);
+    reader_.wait(kFollowSlice);
     if (update()) last_progress = Clock::now();
     if (Clock::now() - last_progress < kVoPatience) continue;
     spdlog::warn("no odometry process answers on {}; publishing without waiting for it",
@@ -52,7 +52,7 @@ void VoFollower::wait_for(std::uint64_t sequence, std::chrono::milliseconds pati
   auto last_progress = Clock::now();
   update();
   while (!is_done(sequence) && !stop() && Clock::now() - last_progress < patience) {
-    reader_.wait(kSlice);
+    reader_.wait(kFollowSlice);
     if (update()) last_progress = Clock::now();
   }
 }

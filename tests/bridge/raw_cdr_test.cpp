@@ -30,7 +30,7 @@ std::optional<CdrSample> take_one(RawReader& reader) {
   return result;
 }
 
-Bytes copy(const CdrSample& sample) { return {sample.bytes().begin(), sample.bytes().end()}; }
+Bytes bytes_copy(const CdrSample& sample) { return {sample.bytes().begin(), sample.bytes().end()}; }
 
 /// A message of a typed writer through a raw reader and a raw writer to a typed reader.
 template <class T>
@@ -116,8 +116,9 @@ TEST(RawCdr, BytesOfAnUnknownTypeArriveUnchanged) {
   }
   ASSERT_TRUE(eventually([&] {
     reader.wait(100ms);
-    (void)reader.take_each(
-        [&](CdrSample sample, const dds_sample_info_t&) { received.push_back(copy(sample)); });
+    (void)reader.take_each([&](CdrSample sample, const dds_sample_info_t&) {
+      received.push_back(bytes_copy(sample));
+    });
     return received.size() == messages.size();
   }));
   EXPECT_EQ(received, messages);
@@ -137,7 +138,7 @@ TEST(RawCdr, ASampleOutlivesItsReader) {
   ASSERT_TRUE(sample.has_value());
   const CdrSample copied = *sample;
   sample.reset();
-  EXPECT_EQ(copy(copied), bytes);
+  EXPECT_EQ(bytes_copy(copied), bytes);
 }
 
 TEST(RawCdr, ABestEffortReaderTakesFromAReliableWriter) {

@@ -50,7 +50,7 @@ struct Ear {
 };
 
 std::string line_of(const bridge::DiscoveredTopic& topic) {
-  return fmt::format("{:<40} {:<36} {:>7} {:>7}", topic.name, topic.type, topic.writers,
+  return fmt::format("{:<40} {:<44} {:>7} {:>7}", topic.name, topic.type, topic.writers,
                      topic.readers);
 }
 
@@ -71,7 +71,7 @@ int list(const AppConfig& config, const TopicOptions& options) {
   const auto topics = ear->discovery.topics();
   if (!topics) return fail(kFailed, topics.error());
   if (!options.json) {
-    std::cout << fmt::format("{:<40} {:<36} {:>7} {:>7}\n", "topic", "type", "writers", "readers");
+    std::cout << fmt::format("{:<40} {:<44} {:>7} {:>7}\n", "topic", "type", "writers", "readers");
   }
   for (const auto& topic : *topics) {
     std::cout << (options.json ? json_of(topic).dump() : line_of(topic)) << "\n";

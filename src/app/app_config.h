@@ -5,7 +5,9 @@
 #include <utility>
 
 #include "sovo/bridge/dds_config.h"
+#include "sovo/driver/live/live_options.h"
 #include "sovo/driver/sim/sim_config.h"
+#include "sovo/driver/v4l2/v4l2_options.h"
 #include "sovo/odometry/stereo_odometry.h"
 
 namespace sovo::app {
@@ -44,6 +46,8 @@ struct CameraSection {
   int start = 0;
   int frames = 0;
   double frame_rate = 20.0;
+  LiveOptions live;
+  v4l2::V4l2Options v4l2;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -56,6 +60,8 @@ struct CameraSection {
     v("start", start, "frames left out at the beginning");
     v("frames", frames, "frames at most; 0: all");
     v("frame_rate", frame_rate, "of images that have no stamps [Hz]");
+    v("live", live, "real cameras of all kinds");
+    v("v4l2", v4l2, "cameras on USB and others that the kernel knows");
   }
 };
 

@@ -9,6 +9,7 @@
 #include "sovo/app/config_options.h"
 #include "sovo/app/failure.h"
 #include "sovo/app/frame_input.h"
+#include "sovo/app/live_camera.h"
 #include "sovo/app/progress.h"
 #include "sovo/app/run_outputs.h"
 #include "sovo/app/sim_input.h"
@@ -190,6 +191,7 @@ void add_camera_command(const Command& program) {
   camera.require_command();
   add_dataset_command(camera);
   add_sim_command(camera);
+  add_live_camera_commands(camera);
 }
 
 }  // namespace sovo::app

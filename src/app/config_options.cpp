@@ -28,13 +28,20 @@ Result<void> apply_all(const std::vector<std::string>& assignments, AppConfig* c
 ConfigOptions& ConfigOptions::value(const std::string& name, const std::string& key,
                                     const std::string& help, const std::string& type) {
   CommandOption option = command_.option(name, help).type(type.empty() ? "VALUE" : type);
-  bindings_.push_back({name, option, key, false});
+  bindings_.push_back({name, option, key, Binding::kValue});
+  return *this;
+}
+
+ConfigOptions& ConfigOptions::list(const std::string& name, const std::string& key,
+                                   const std::string& help, const std::string& type) {
+  CommandOption option = command_.option(name, help).type(type).repeatable();
+  bindings_.push_back({name, option, key, Binding::kList});
   return *this;
 }
 
 ConfigOptions& ConfigOptions::flag(const std::string& name, const std::string& key,
                                    const std::string& help) {
-  bindings_.push_back({name, command_.flag(name, help), key, true});
+  bindings_.push_back({name, command_.flag(name, help), key, Binding::kFlag});
   return *this;
 }
 
@@ -43,12 +50,22 @@ bool ConfigOptions::is_given(const std::string& name) const {
                      [&name](const Binding& b) { return b.name == name && b.option.count() > 0; });
 }
 
+std::string ConfigOptions::value_of(const Binding& binding) {
+  if (binding.kind == Binding::kFlag) return "true";
+  if (binding.kind == Binding::kValue) return binding.option.values().back();
+  std::string list;
+  for (const std::string& value : binding.option.values()) {
+    list += (list.empty() ? "" : ",") + value;
+  }
+  return list;
+}
+
 std::vector<std::string> ConfigOptions::assignments() const {
   std::vector<std::string> all;
   for (const std::string& a : command_.global_option("--set").values()) all.push_back(a);
   for (const Binding& b : bindings_) {
     if (b.option.count() == 0) continue;
-    all.push_back(b.key + "=" + (b.is_flag ? "true" : b.option.values().back()));
+    all.push_back(b.key + "=" + value_of(b));
   }
   return all;
 }

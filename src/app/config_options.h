@@ -17,6 +17,9 @@ class ConfigOptions {
   /// `--name VALUE` sets `key`; `type` is what `--help` shows for the value.
   ConfigOptions& value(const std::string& name, const std::string& key, const std::string& help,
                        const std::string& type = "");
+  /// `--name VALUE`, which may be repeated, sets the list `key`.
+  ConfigOptions& list(const std::string& name, const std::string& key, const std::string& help,
+                      const std::string& type);
   /// `--name` sets `key` to true.
   ConfigOptions& flag(const std::string& name, const std::string& key, const std::string& help);
 
@@ -32,8 +35,9 @@ class ConfigOptions {
     std::string name;
     CommandOption option;
     std::string key;
-    bool is_flag;
+    enum Kind { kValue, kList, kFlag } kind;
   };
+  static std::string value_of(const Binding& binding);
   std::vector<std::string> assignments() const;
 
   Command command_;

@@ -38,6 +38,7 @@ int run(int argc, char** argv) {
   add_bench_command(root);
   add_calib_command(root);
   add_config_command(root);
+  add_doctor_command(root);
   return program.run(argc, argv);
 }
 

@@ -37,7 +37,7 @@ Calibration parse_yaml_calibration(const std::string& path, const CalibrationOpt
   }
   throw FormatError(path +
                     ": is no calibration that is known: sovo, EuRoC sensor.yaml, Kalibr camchain, "
-                    "OpenCV stereo (M1 D1 M2 D2 R T) or ROS camera_info");
+                    "OpenCV stereo (M1 D1 M2 D2 R T), ROS camera_info or a ZED's SN*.conf");
 }
 
 Calibration parse_file(const std::string& path, const CalibrationOptions& options) {
@@ -47,6 +47,7 @@ Calibration parse_file(const std::string& path, const CalibrationOptions& option
     if (line.starts_with("P0:") || line.starts_with("P2:")) {
       return formats::parse_kitti(text, path, options);
     }
+    if (line.starts_with("[LEFT_CAM_")) return formats::parse_zed(text, path, options);
   }
   return parse_yaml_calibration(path, options);
 }

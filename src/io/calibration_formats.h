@@ -41,6 +41,9 @@ Calibration parse_euroc(const std::string& mav_folder);
 Calibration parse_kalibr(const YamlField& root);
 Calibration parse_opencv(const YamlField& root, const CalibrationOptions& options);
 Calibration parse_ros(const YamlField& root, const CalibrationOptions& options);
+/// Stereolabs' SN*.conf: all resolutions in one file, the options say which.
+Calibration parse_zed(const std::string& text, const std::string& path,
+                      const CalibrationOptions& options);
 
 /// Reads a YAML file; OpenCV's FileStorage header is skipped.
 YamlField read_yaml_file(const std::string& path);

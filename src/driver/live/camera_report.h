@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "sovo/driver/live/stereo_pairer.h"
@@ -46,6 +47,8 @@ struct CameraReport {
   double clock_sigma_s = 0.0;  ///< Of the stamps.
   double downtime_s = 0.0;     ///< Length of the last loss.
   std::optional<double> temperature_c;
+  /// Further counters of the driver, by name; empty when it has none.
+  std::vector<std::pair<std::string, std::string>> stream;
 };
 
 /// How a stereo camera is doing.

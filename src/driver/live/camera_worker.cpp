@@ -10,6 +10,7 @@ namespace {
 /// How long a wait for an image lasts before the thread looks whether it shall stop.
 constexpr std::chrono::milliseconds kSlice(100);
 constexpr std::chrono::seconds kRateWindow(2);
+constexpr std::chrono::seconds kAskEvery(1);
 
 double seconds(std::chrono::steady_clock::duration d) {
   return std::chrono::duration<double>(d).count();
@@ -116,16 +117,24 @@ void CameraWorker::stream(CaptureDevice* device) {
     }
     last_sign = now;
     if (state == CaptureState::kImage) {
-      if (first_since_open_) {
-        found();
-        const std::scoped_lock lock(mutex_);
-        report_.temperature_c = device->temperature();
-      }
+      if (first_since_open_) found();
       handle_image(&capture);
+      ask_device(device, now);
     } else {
       handle_bad(state, capture);
     }
   }
+}
+
+/// What the device knows of itself, once a second.
+void CameraWorker::ask_device(CaptureDevice* device, Clock::time_point now) {
+  if (now - last_asked_ < kAskEvery) return;
+  last_asked_ = now;
+  auto counters = device->counters();
+  const auto temperature = device->temperature();
+  const std::scoped_lock lock(mutex_);
+  report_.stream = std::move(counters);
+  report_.temperature_c = temperature;
 }
 
 void CameraWorker::apply_request(CaptureDevice* device) {

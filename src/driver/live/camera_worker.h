@@ -53,6 +53,7 @@ class CameraWorker {
   void run();
   std::unique_ptr<CaptureDevice> open_device();
   void stream(CaptureDevice* device);
+  void ask_device(CaptureDevice* device, Clock::time_point now);
   void apply_request(CaptureDevice* device);
   void handle_image(Capture* capture);
   void handle_bad(CaptureState state, const Capture& capture);
@@ -73,6 +74,7 @@ class CameraWorker {
   std::uint64_t next_sequence_ = 0;
   std::optional<Clock::time_point> last_image_;
   bool first_since_open_ = true;
+  Clock::time_point last_asked_{};
   Clock::time_point rate_since_{};
   std::uint64_t rate_images_ = 0;
 

@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "sovo/image/stereo_frame.h"
 #include "sovo/io/result.h"
@@ -52,6 +54,9 @@ class CaptureDevice {
 
   /// Temperature of the sensor [deg C], where offered.
   virtual std::optional<double> temperature() { return std::nullopt; }
+
+  /// Counters of the driver's own, by name, for diagnostics; asked for once a second.
+  virtual std::vector<std::pair<std::string, std::string>> counters() { return {}; }
 
   /// What is open: device and mode, for people.
   virtual std::string description() const = 0;

@@ -26,7 +26,7 @@ StereoFrame to_frame(StereoPair pair) {
 
 LiveSource::LiveSource(StereoRig rig, const LiveSourceConfig& config,
                        std::vector<LiveCamera> cameras)
-    : rig_(std::move(rig)), pairer_(config.pair_tolerance_ns) {
+    : rig_(std::move(rig)), pairer_(config.pair_tolerance_ns, config.max_waiting) {
   if (config.auto_exposure) auto_exposure_.emplace(*config.auto_exposure);
   const bool both = cameras.size() == 1;
   workers_.reserve(cameras.size());

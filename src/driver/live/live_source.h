@@ -22,6 +22,7 @@ struct LiveCamera {
 
 struct LiveSourceConfig {
   std::int64_t pair_tolerance_ns = 8'000'000;  ///< Of two devices.
+  std::size_t max_waiting = 5;                 ///< See `StereoPairer`.
   std::optional<AutoExposureConfig> auto_exposure;
 };
 

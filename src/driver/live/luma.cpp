@@ -90,6 +90,13 @@ bool LumaReader::check(const RawImage& image) {
 }
 
 bool LumaReader::decode_jpeg(const RawImage& image, std::uint8_t* luma) {
+  if (try_jpeg(image, luma)) return true;
+  // A decoder that met damaged data goes on to refuse good data.
+  decoder_.reset();
+  return false;
+}
+
+bool LumaReader::try_jpeg(const RawImage& image, std::uint8_t* luma) {
   if (!decoder_) decoder_ = std::make_unique<Decoder>();
   const auto size = static_cast<unsigned long>(image.bytes.size());
   int width = 0;

@@ -53,6 +53,7 @@ class LumaReader {
  private:
   struct Decoder;
   bool check(const RawImage& image);
+  bool try_jpeg(const RawImage& image, std::uint8_t* luma);
   bool decode_jpeg(const RawImage& image, std::uint8_t* luma);
 
   std::unique_ptr<Decoder> decoder_;

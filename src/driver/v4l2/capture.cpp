@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kExposureEvery = 60;                 // images; reading it is a transfer on the bus
 constexpr double kExposureUnit = 100e-6;           // of V4L2_CID_EXPOSURE_ABSOLUTE [s]
-constexpr std::int64_t kOldestNs = 1'000'000'000;  // of a stamp that can be of CLOCK_MONOTONIC
+constexpr std::int64_t kOldestNs = 1'000'000'000;  // of a stamp of an unnamed clock
 
 v4l2_buffer make_buffer(std::uint32_t index) {
   v4l2_buffer buffer{};
@@ -195,7 +195,11 @@ void V4l2Capture::fill_times(const v4l2_buffer& taken, Capture* capture) {
   capture->clock_utc_ns = now.utc_ns;
   std::int64_t stamp = to_ns(taken.timestamp);
   double offset = 1e-3 * options_.v4l2.stamp_offset_ms;
-  const bool usable = stamp <= now.monotonic_ns && stamp > now.monotonic_ns - kOldestNs;
+  const bool monotonic =
+      (taken.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;
+  // Drivers that do not say which clock it is mostly mean this one all the same.
+  const bool recent = stamp > now.monotonic_ns - kOldestNs;
+  const bool usable = stamp > 0 && stamp <= now.monotonic_ns && (monotonic || recent);
   const auto source = taken.flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK;
   if (!usable) {
     // Of an unknown clock: the arrival is what is left.

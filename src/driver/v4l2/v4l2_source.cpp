@@ -34,29 +34,6 @@ class DeviceFinder {
   std::optional<DeviceInfo> known_;
 };
 
-Result<void> check_options(const V4l2Options& options, const LiveOptions& live) {
-  if (options.left.empty() != options.right.empty()) {
-    return Error{"--left and --right go together; one side-by-side camera is --device"};
-  }
-  if (options.two_devices() && !options.device.empty()) {
-    return Error{"give either --device, or --left and --right"};
-  }
-  if (options.two_devices() && options.left == options.right) {
-    return Error{"--left and --right are the same device"};
-  }
-  if ((options.width > 0) != (options.height > 0) || options.width < 0) {
-    return Error{"camera.v4l2.width and height must both be positive, or both 0"};
-  }
-  if (options.buffers < 4 || options.buffers > 32) {
-    return Error{"camera.v4l2.buffers must be 4 to 32"};
-  }
-  if (!(live.stall_s > 0.0) || !(live.longest_wait_s > 0.0)) {
-    return Error{"camera.live.stall_s and longest_wait_s must be positive"};
-  }
-  if (auto controls = parse_controls(options.controls); !controls) return controls.failure();
-  return {};
-}
-
 /// Calibration that Stereolabs' programs leave on the machine.
 std::string zed_settings(const std::string& serial) {
   std::error_code error;
@@ -158,6 +135,29 @@ Result<void> check_fit(const Probe& probe, const CameraModel& camera, bool side_
 }
 
 }  // namespace
+
+Result<void> check_options(const V4l2Options& options, const LiveOptions& live) {
+  if (options.left.empty() != options.right.empty()) {
+    return Error{"--left and --right go together; one side-by-side camera is --device"};
+  }
+  if (options.two_devices() && !options.device.empty()) {
+    return Error{"give either --device, or --left and --right"};
+  }
+  if (options.two_devices() && options.left == options.right) {
+    return Error{"--left and --right are the same device"};
+  }
+  if ((options.width > 0) != (options.height > 0) || options.width < 0) {
+    return Error{"camera.v4l2.width and height must both be positive, or both 0"};
+  }
+  if (options.buffers < 4 || options.buffers > 32) {
+    return Error{"camera.v4l2.buffers must be 4 to 32"};
+  }
+  if (!(live.stall_s > 0.0) || !(live.longest_wait_s > 0.0)) {
+    return Error{"camera.live.stall_s and longest_wait_s must be positive"};
+  }
+  if (auto controls = parse_controls(options.controls); !controls) return controls.failure();
+  return {};
+}
 
 Result<OpenedSource> open_v4l2(const V4l2Options& options, const LiveOptions& live,
                                const std::string& calibration) {

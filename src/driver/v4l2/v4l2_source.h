@@ -18,6 +18,9 @@ struct OpenedSource {
   std::vector<std::string> notes;  ///< For people: what was assumed or is missing yet.
 };
 
+/// Whether the options make sense by themselves; `open_v4l2` asks already.
+Result<void> check_options(const V4l2Options& options, const LiveOptions& live);
+
 /// Looks the devices up, tries mode and controls, and starts the source. A device that is not there
 /// yet is waited for; a wrong mode, control or calibration is an error that says what to do.
 /// `calibration`: a file, or empty for the ZED's own in /usr/local/zed/settings.

@@ -1,0 +1,100 @@
+# What vm_test.py runs in the virtual machine.
+# shellcheck shell=bash source-path=SCRIPTDIR
+. "$(dirname "$0")/guest_common.sh"
+modprobe vhci_hcd
+modprobe uvcvideo
+calibration 672 376 /tmp/vga.yaml
+calibration 1280 720 /tmp/hd.yaml
+# Programs come over a slow file system: read them before time matters.
+cat "$BIN/camera_check" "$BIN/emulated_zed" "$BIN/pattern_writer" >/dev/null
+
+plug_in() {
+  "$BIN/emulated_zed" 0 &
+  ZED=$!
+  wait_for_device ZED
+}
+unplug() {
+  kill -9 "$ZED"
+  wait "$ZED" 2>/dev/null
+}
+# check FILE ARGUMENTS...: camera_check in the background, its output in FILE; waits for a frame.
+check() {
+  local file=$1 tries
+  shift
+  "$BIN/camera_check" "$@" >"$file" 2>&1 &
+  CHECK=$!
+  for tries in $(seq 300); do
+    grep -q "FIRST FRAME" "$file" && return 0
+    sleep 0.1
+  done
+  echo "no frame after $tries tries"
+}
+
+plug_in
+begin zed_list
+"$BIN/sovo" camera list
+begin zed_stream
+"$BIN/camera_check" /tmp/vga.yaml $((30 * SECONDS_EACH)) $((60 * SECONDS_EACH)) \
+  device=0012345 width=1344 height=376 frame_rate=30 "controls=exposure=42,gain=33"
+v4l2-ctl -d "$DEVICE" -C gain,exposure_time_absolute,auto_exposure
+begin zed_published
+timeout 120 "$BIN/sovo" camera v4l2 --size 1344x376 --rate 15 --calib /tmp/vga.yaml --frames 30 \
+  --control gain=22 --control exposure=50 2>&1
+begin zed_controls
+"$BIN/camera_check" /tmp/vga.yaml 1 10 width=1344 height=376 controls=gain=101
+"$BIN/camera_check" /tmp/vga.yaml 1 10 width=1344 height=376 controls=brightnes=1
+
+begin zed_unplug
+check /tmp/unplug.txt /tmp/vga.yaml 10 $((120 * REPEATS)) width=1344 height=376 frame_rate=15 \
+  controls=gain=44 reconnects="$REPEATS"
+for n in $(seq "$REPEATS"); do
+  sleep 1
+  unplug
+  # In another place than before: the device's number may change, the port stays.
+  sleep 0.7
+  plug_in
+  echo "NODE $n $(cut -d" " -f1 /proc/uptime)"
+  for _ in $(seq 100); do
+    sleep 0.1
+    [ "$(v4l2-ctl -d "$DEVICE" -C gain)" = "gain: 44" ] && break
+  done
+done
+wait "$CHECK"
+cat /tmp/unplug.txt
+v4l2-ctl -d "$DEVICE" -C gain
+unplug
+
+begin loopback
+modprobe v4l2loopback devices=1 video_nr=20 card_label=Loop exclusive_caps=0 max_buffers=8
+"$BIN/pattern_writer" /dev/video20 2560 720 10 $((10 * SECONDS_EACH + 40)) &
+WRITER=$!
+sleep 0.5
+"$BIN/camera_check" /tmp/hd.yaml $((8 * SECONDS_EACH)) $((60 * SECONDS_EACH)) device=/dev/video20 \
+  width=2560 height=720
+kill "$WRITER" 2>/dev/null
+wait "$WRITER" 2>/dev/null
+
+begin vivid_errors
+modprobe vivid n_devs=1 node_types=0x1 num_inputs=1 input_types=3 vid_cap_nr=30 || echo "no vivid"
+VIVID=/dev/video30
+v4l2-ctl -d $VIVID --set-dv-bt-timings query >/dev/null 2>&1
+v4l2-ctl -d $VIVID -v width=1280,height=360,pixelformat=YUYV >/dev/null
+calibration 640 360 /tmp/vivid.yaml
+check /tmp/vivid.txt /tmp/vivid.yaml 400 60 device=$VIVID width=1280 height=360 pattern=false
+for _ in $(seq 4); do
+  v4l2-ctl -d $VIVID -c inject_v4l2_buf_flag_error=0 2>/dev/null
+  sleep 0.2
+done
+v4l2-ctl -d $VIVID -c percentage_of_dropped_buffers=30 2>&1
+wait "$CHECK"
+cat /tmp/vivid.txt
+v4l2-ctl -d $VIVID -c percentage_of_dropped_buffers=0
+v4l2-ctl -d $VIVID -L | grep -i -E 'inject|drop|disconn'
+
+begin vivid_disconnect
+check /tmp/vivid.txt /tmp/vivid.yaml 20 60 device=$VIVID width=1280 height=360 pattern=false \
+  reconnects=1
+v4l2-ctl -d $VIVID -c disconnect=0
+wait "$CHECK"
+cat /tmp/vivid.txt
+exit 0

@@ -38,6 +38,15 @@ async function startDashboard(...args) {
   return child;
 }
 
+/** A walk takes half a minute: cameras come again until the test is over. */
+function keepCameras() {
+  const world = ["--world", "lawn", "--rate", "6", "--restamp"];
+  const camera = start(kSovo, "camera", "sim", ...kBus, "--ns", kNs, ...world);
+  void camera.ended.then(() => {
+    if (processes.delete(camera)) keepCameras();
+  });
+}
+
 const startVo = () => start(kSovo, "vo", ...kBus, "--ns", kNs);
 
 async function step(name, work) {
@@ -150,6 +159,7 @@ async function checkCommands(browser) {
   assert.equal((await fetch(`${dashboard.url}metrics`)).status, 401);
   const context = await browser.newContext({ viewport: { width: 1280, height: 720 } });
   const page = await context.newPage();
+  page.setDefaultTimeout(120_000);
   await page.goto(`${dashboard.url}?token=${token}`);
   assert.equal(page.url(), dashboard.url, "the token leaves the address");
   const cookie = (await context.cookies()).find((c) => c.name.startsWith("sovo_session"));
@@ -200,10 +210,10 @@ async function run() {
   let dashboard = await startDashboard("--listen", "127.0.0.1:0");
   const listener = start(kListener, kNs, path.join(folder, "heard.txt"));
   let vo = startVo();
-  start(kSovo, "camera", "sim", ...kBus, "--ns", kNs, "--restamp", "--world", process.env.SOVO_WORLD ?? "lawn",
-    "--rate", process.env.SOVO_RATE ?? "6");
+  keepCameras();
   const context = await browser.newContext({ viewport: { width: 1280, height: 720 }, acceptDownloads: true });
   const page = await context.newPage();
+  page.setDefaultTimeout(120_000);
   const errors = [];
   page.on("pageerror", (error) => errors.push(error.message));
   page.on("console", (m) => m.type() === "error" && !/WebSocket|ERR_CONNECTION/.test(m.text()) && errors.push(m.text()));
@@ -255,6 +265,8 @@ try {
   for (const child of processes) if (child.log) console.log(child.spawnargs.join(" "), "\n", child.log.slice(-2000));
   code = 1;
 }
-for (const child of processes) child.kill("SIGKILL");
+const last = [...processes];
+processes.clear();
+for (const child of last) child.kill("SIGKILL");
 fs.rmSync(folder, { recursive: true, force: true });
 process.exit(code);

@@ -38,7 +38,7 @@ export class Banner {
 
   constructor() {
     const words = element("div", { class: "words" });
-    words.append(element("div", {}, this.name, " ", this.age), this.reason);
+    words.append(element("div", {}, this.name, "  ", this.age), this.reason);
     this.state.append(element("span", { class: "lamp" }), words);
     const all = [this.speed, this.depth, this.distance, this.scale, this.latency, this.rate];
     this.figures.append(...all.map((f) => f.node));
@@ -84,7 +84,7 @@ export class Banner {
       const parts = live ? [vehicle.status.reason, words.advice] : [];
       reason = parts.filter((p) => p !== "").join(" · ");
       if (live && state === 1 && reason === "") {
-        reason = `pose and scale are good · segment ${vehicle.status.segment}, ${vehicle.status.keyframes} keyframes, ${vehicle.status.inliers} of ${vehicle.status.points} points agree`;
+        reason = `pose and scale are good · segment ${vehicle.status.segment}, ${vehicle.status.keyframes} keyframes and ${vehicle.status.points} points in the window`;
       }
       if (live && age > kStaleMs) {
         [color, alarm] = ["--grey", false];

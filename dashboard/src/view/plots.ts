@@ -195,7 +195,7 @@ class Plot {
     return {
       width,
       height: kHeight,
-      padding: [4, 2, 2, 0],
+      padding: [6, 2, 6, 0],
       legend: { show: false },
       cursor: {
         y: false,

@@ -86,8 +86,6 @@ export class SceneView {
   private touched = false;
   private dirty = true;
   private lastFrame = 0;
-  private ground = 0;
-  private groundSeen = 0;
   private readonly followed = new Vector3();
   private frames: number[] = [];
 
@@ -138,7 +136,6 @@ export class SceneView {
     this.drawnWindow = -1;
     this.drawnPath = undefined;
     this.touched = false;
-    this.groundSeen = 0;
     this.dirty = true;
   }
 
@@ -160,8 +157,7 @@ export class SceneView {
   }
 
   get gridText(): string {
-    const at = this.ground === 0 ? "" : ` at z = ${this.ground.toFixed(1)} m`;
-    return `grid ${Number(this.grid.step.toPrecision(1))} m${at}`;
+    return `grid ${Number(this.grid.step.toPrecision(1))} m, at z = 0 of odom`;
   }
 
   /** Metres that one pixel of the page spans at the place looked at. */
@@ -206,6 +202,10 @@ export class SceneView {
       low.min(p);
       high.max(p);
     }
+    for (const { pose } of this.vehicle?.path?.poses ?? []) {
+      low.min(pose.position as Vector3);
+      high.max(pose.position as Vector3);
+    }
     const centre = low.clone().add(high).multiplyScalar(0.5);
     const radius = Math.max(high.distanceTo(low) / 2, 1);
     const controls = this.activeControls;
@@ -217,7 +217,7 @@ export class SceneView {
       this.setPlanSpan(radius * 2.3);
     } else {
       const aspect = Math.min(this.eye.aspect, 1.4);
-      this.eye.position.copy(centre).addScaledVector(away, (radius * 2.3) / Math.min(aspect, 1));
+      this.eye.position.copy(centre).addScaledVector(away, (radius * 2.7) / Math.min(aspect, 1));
     }
     controls.update();
     this.dirty = true;
@@ -266,7 +266,6 @@ export class SceneView {
     this.updateMarker(vehicle, time);
     this.updateKeyframes(vehicle);
     this.updatePoints(vehicle);
-    this.updateGround(vehicle);
     if (!this.touched && this.view !== "follow") this.fit();
     this.dirty = true;
   }
@@ -352,7 +351,7 @@ export class SceneView {
     this.dirty = false;
     const controls = this.activeControls;
     const distance = this.metresPerPixel * this.host.clientHeight;
-    this.grid.update(controls.target.x, controls.target.y, this.ground, distance);
+    this.grid.update(controls.target.x, controls.target.y, distance);
     this.marker.setSize(Math.min(Math.max(distance * 0.075, 0.08), 20));
     if (!this.isPlan) {
       this.eye.near = Math.max(distance / 400, 0.01);
@@ -432,7 +431,7 @@ export class SceneView {
     this.marker.setColor(this.stateColors[vehicle.poses.state(i)] ?? this.stateColors[6]!);
     const picture = this.marker.object.userData.noPicture ? undefined : vehicle.left.at(time);
     this.marker.setPicture(picture?.bitmap);
-    this.plumb.geometry.setFromPoints([new Vector3(x, y, z), new Vector3(x, y, this.ground)]);
+    this.plumb.geometry.setFromPoints([new Vector3(x, y, z), new Vector3(x, y, 0)]);
     this.plumb.computeLineDistances();
     if (this.view === "follow") {
       const delta = new Vector3(x, y, z).sub(this.followed);
@@ -462,18 +461,6 @@ export class SceneView {
     this.window.geometry.dispose();
     this.window.geometry = new BufferGeometry();
     this.window.geometry.setAttribute("position", new BufferAttribute(vehicle.windowPoints, 3));
-  }
-
-  /** The grid lies where the lowest points of the map are, once there are some. */
-  private updateGround(vehicle: Vehicle): void {
-    const map = vehicle.map;
-    if (map.count < 500 || map.count < 1.5 * this.groundSeen) return;
-    this.groundSeen = map.count;
-    const heights: number[] = [];
-    const step = Math.max(1, Math.floor(map.count / 5000));
-    for (let i = 0; i < map.count; i += step) heights.push(map.positions[3 * i + 2]!);
-    heights.sort((a, b) => a - b);
-    this.ground = Math.round(heights[Math.floor(heights.length * 0.03)]! * 10) / 10;
   }
 
   private pressed(event: PointerEvent): void {
@@ -510,8 +497,11 @@ export class SceneView {
       const positions = (nearest.object as Points).geometry.getAttribute("position");
       return new Vector3().fromBufferAttribute(positions as BufferAttribute, nearest.index);
     }
-    const ground = new Plane(new Vector3(0, 0, 1), -this.ground);
-    return caster.ray.intersectPlane(ground, new Vector3()) ?? undefined;
+    // Seen from the side the ground is a line: there the plane through what is looked at is meant.
+    const side = this.view === "side";
+    const normal = side ? new Vector3(0, 1, 0) : new Vector3(0, 0, 1);
+    const plane = new Plane(normal, side ? -this.planControls.target.y : 0);
+    return caster.ray.intersectPlane(plane, new Vector3()) ?? undefined;
   }
 
   private placeRulerLabel(): void {

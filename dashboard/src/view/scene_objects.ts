@@ -184,7 +184,7 @@ export class MapCloud {
     geometry.setAttribute("position", positions);
     geometry.setAttribute("color", colors);
     geometry.setDrawRange(0, 0);
-    const material = new PointsMaterial({ size: 2, sizeAttenuation: false, vertexColors: true });
+    const material = new PointsMaterial({ size: 1.5, sizeAttenuation: false, vertexColors: true });
     this.object = new Points(geometry, material);
     this.object.frustumCulled = false;
   }
@@ -201,7 +201,7 @@ export class MapCloud {
     const colors = geometry.getAttribute("color") as BufferAttribute;
     for (let i = this.uploaded; i < this.map.count; ++i) {
       const grey = this.map.intensities[i]!;
-      const tone = light ? 40 + grey * 0.5 : 70 + grey * 0.72;
+      const tone = light ? 70 + grey * 0.45 : 48 + grey * 0.5;
       colors.array[3 * i] = tone * 0.93;
       colors.array[3 * i + 1] = tone * 0.98;
       colors.array[3 * i + 2] = Math.min(255, tone * 1.04);
@@ -237,13 +237,13 @@ export class GroundGrid {
     (this.strong.material as LineBasicMaterial).color.set(strong);
   }
 
-  update(x: number, y: number, z: number, distance: number): void {
+  update(x: number, y: number, distance: number): void {
     const exponent = Math.floor(Math.log10(Math.max(distance, 1e-3) / 8));
     const mantissa = distance / 8 / 10 ** exponent;
     this.step = (mantissa < 2 ? 1 : mantissa < 5 ? 2 : 5) * 10 ** exponent;
     const unit = 5 * this.step;
     const [cx, cy] = [Math.round(x / unit) * unit, Math.round(y / unit) * unit];
-    const key = [this.step, cx, cy, z].join();
+    const key = [this.step, cx, cy].join();
     if (key === this.key) return;
     this.key = key;
     const [fine, strong]: [number[], number[]] = [[], []];
@@ -252,7 +252,7 @@ export class GroundGrid {
     for (let i = -n; i <= n; ++i) {
       const out = i % 5 === 0 ? strong : fine;
       const [gx, gy] = [cx + i * this.step, cy + i * this.step];
-      out.push(gx, cy - reach, z, gx, cy + reach, z, cx - reach, gy, z, cx + reach, gy, z);
+      out.push(gx, cy - reach, 0, gx, cy + reach, 0, cx - reach, gy, 0, cx + reach, gy, 0);
     }
     setPositions(this.fine, new Float32Array(fine));
     setPositions(this.strong, new Float32Array(strong));

@@ -97,10 +97,14 @@ class TestWebClient {
     int opcode = 0;
     std::string payload;
   };
-  /// The next frame; nothing when the connection ended.
+  /// The next frame; nothing when the server closed the connection.
   std::optional<Frame> receive() {
+    constexpr int kClose = 8;
     while (true) {
-      if (auto frame = parse_frame()) return frame;
+      if (auto frame = parse_frame()) {
+        if (frame->opcode == kClose) return std::nullopt;
+        return frame;
+      }
       if (!fill()) return std::nullopt;
     }
   }

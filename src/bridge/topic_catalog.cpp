@@ -42,12 +42,12 @@ std::vector<CatalogTopic> make_catalog() {
       topic<msg::Path>(kPath, kPathQos),
       on_demand<msg::PointCloud2>("points", reliable(2)),
       topic<msg::VoCommand>(kCommand, kCommandQos),
-      topic<msg::RecorderCommand>("record_command", reliable(10)),
-      topic<msg::RecorderStatus>("record_status", reliable(10)),
+      topic<msg::RecorderCommand>(kRecordCommand, kRecordCommandQos),
+      topic<msg::RecorderStatus>(kRecordStatus, kRecordStatusQos),
       topic<msg::TFMessage>(kTf, kTfQos),
       topic<msg::TFMessage>(kTfStatic, kTfStaticQos),
       topic<msg::DiagnosticArray>(kDiagnostics, kDiagnosticsQos),
-      topic<msg::Clock>("/clock", reliable(10)),
+      topic<msg::Clock>(kClock, kClockQos),
   };
   add_side("left", &catalog);
   add_side("right", &catalog);

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "sovo/io/recording_config.h"
 #include "sovo/io/result.h"
 
 namespace sovo {
@@ -41,12 +42,6 @@ enum class Opcode : std::uint8_t {
   kSummaryOffset = 0x0E,
   kDataEnd = 0x0F,
 };
-
-enum class Compression : std::uint8_t { kNone, kLz4, kZstd };
-
-constexpr std::array<std::pair<Compression, const char*>, 3> enum_names(Compression) {
-  return {{{Compression::kNone, "none"}, {Compression::kLz4, "lz4"}, {Compression::kZstd, "zstd"}}};
-}
 
 struct Schema {
   std::uint16_t id = 0;

@@ -16,13 +16,8 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr double kMegabyte = 1e6;
 constexpr std::chrono::milliseconds kLongestChunk(800);  // with what `tick` is late, below a second
 constexpr char kDrops[] = "sovo_drops";
-
-std::uint64_t to_bytes(double megabytes) {
-  return static_cast<std::uint64_t>(std::max(megabytes, 0.0) * kMegabyte);
-}
 
 }  // namespace
 
@@ -62,7 +57,7 @@ Result<void> RecordingWriter::open_file() {
   }
   McapWriterConfig config;
   config.compression = config_.compression;
-  config.chunk_bytes = std::max<std::uint64_t>(to_bytes(config_.chunk_mb), 1);
+  config.chunk_bytes = std::max<std::uint64_t>(config_.chunk_bytes, 1);
   auto writer = McapWriter::create(file_path_, config);
   if (!writer) return writer.failure();
   writer_ = std::move(*writer);
@@ -97,7 +92,7 @@ std::uint16_t RecordingWriter::channel_of(Topic& topic) {
 Result<void> RecordingWriter::write(std::size_t index, std::uint64_t log_ns,
                                     std::uint64_t publish_ns, ByteSpan data) {
   if (!writer_) return Error{path_ + " is closed"};
-  const std::uint64_t split = to_bytes(config_.split_mb);
+  const std::uint64_t split = config_.split_bytes;
   if (is_folder_ && split > 0 && writer_->bytes() >= split && messages() > 0) {
     if (auto done = close_file(); !done) return done;
     if (auto done = open_file(); !done) return done;
@@ -134,10 +129,12 @@ Result<void> RecordingWriter::tick() {
   if (auto done = writer_->flush(); !done) return done;
   if (auto done = store_drops(); !done) return done;
   const std::uint64_t left = free_bytes(path_);
-  if (left >= to_bytes(config_.min_free_mb)) return {};
-  return Error{"the disk of " + path_ + " has " + format_fixed(static_cast<double>(left) / 1e6, 0) +
-               " MB left, less than " + format_fixed(config_.min_free_mb, 0) +
-               " MB: free some, or ask for less with --min-free"};
+  if (left >= config_.min_free_bytes) return {};
+  const auto megabytes = [](std::uint64_t bytes) {
+    return format_fixed(static_cast<double>(bytes) * 1e-6, 0) + " MB";
+  };
+  return Error{"the disk of " + path_ + " has " + megabytes(left) + " left, less than " +
+               megabytes(config_.min_free_bytes) + ": free some, or ask for less with --min-free"};
 }
 
 Result<void> RecordingWriter::close_file() {
@@ -153,6 +150,10 @@ Result<void> RecordingWriter::close_file() {
 Result<void> RecordingWriter::close() {
   if (!writer_) return {};
   auto closed = close_file();
+  if (!closed) {  // it reads all the same, up to its last chunk
+    files_.push_back(
+        {fs::path(file_path_).filename().string(), writer_->statistics(), writer_->bytes()});
+  }
   writer_.reset();
   const auto written = write_metadata();
   return closed ? written : closed;

@@ -8,23 +8,9 @@
 #include <vector>
 
 #include "sovo/io/mcap_writer.h"
+#include "sovo/io/recording_config.h"
 
 namespace sovo {
-
-struct RecordingConfig {
-  mcap::Compression compression = mcap::Compression::kLz4;
-  double chunk_mb = 4.0;
-  double split_mb = 0.0;        ///< A file is followed by another beyond this size; 0: never.
-  double min_free_mb = 1000.0;  ///< Recording ends when the disk has less left.
-
-  template <class Visitor>
-  void visit(Visitor& v) {
-    v("compression", compression, "of the chunks: none, lz4 or zstd");
-    v("chunk_mb", chunk_mb, "a chunk is closed beyond this size [MB], and after a second at most");
-    v("split_mb", split_mb, "a file is followed by another beyond this size [MB]; 0: never");
-    v("min_free_mb", min_free_mb, "recording ends when the disk has less left [MB]");
-  }
-};
 
 /// What a recording says of a topic.
 struct RecordingTopic {

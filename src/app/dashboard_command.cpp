@@ -17,7 +17,7 @@
 namespace sovo::app {
 namespace {
 
-std::vector<std::string> split(const std::string& text) {
+std::vector<std::string> comma_separated(const std::string& text) {
   std::vector<std::string> parts;
   std::istringstream stream(text);
   for (std::string part; std::getline(stream, part, ',');) {
@@ -36,7 +36,7 @@ std::optional<Number> parse_number(const std::string& text) {
 
 Result<std::vector<int>> parse_domains(const std::string& text) {
   std::vector<int> domains;
-  for (const std::string& part : split(text)) {
+  for (const std::string& part : comma_separated(text)) {
     const auto domain = parse_number<int>(part);
     if (!domain || *domain < 0) return Error{"domain '" + part + "': a number from 0 to 232"};
     domains.push_back(*domain);
@@ -82,7 +82,7 @@ Result<bridge::DashboardServerConfig> server_config(const DashboardSection& sect
   if (auto done = check_safety(section, config.web); !done) return done.failure();
   config.web.tls_cert = section.tls_cert;
   config.web.tls_key = section.tls_key;
-  config.allowed_origins = split(section.allow_origin);
+  config.allowed_origins = comma_separated(section.allow_origin);
   config.hub.allow_commands = section.allow_commands;
   if (!section.token_file.empty()) {
     auto token = bridge::read_token_file(section.token_file);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "sovo/bridge/dds_config.h"
+#include "sovo/bridge/recorder_config.h"
 #include "sovo/driver/live/live_options.h"
 #include "sovo/driver/sim/sim_config.h"
 #include "sovo/driver/v4l2/v4l2_options.h"
@@ -38,6 +39,7 @@ constexpr std::array<std::pair<Kernels, const char*>, 2> enum_names(Kernels) {
 /// simulated cameras too.
 struct CameraSection {
   std::string path;         ///< Dataset folder.
+  std::string mcap;         ///< Recording to run on instead.
   std::string calibration;  ///< Empty: the one that belongs to the dataset.
   std::string rate = "auto";
   std::string name;
@@ -52,6 +54,7 @@ struct CameraSection {
   template <class Visitor>
   void visit(Visitor& v) {
     v("path", path, "dataset: KITTI odometry, EuRoC, TUM-VI, or folders left/ and right/");
+    v("mcap", mcap, "recording that sovo run reads: an .mcap file or a folder of them");
     v("calibration", calibration, "calibration file; empty: the one of the dataset or of the bus");
     v("rate", rate, "1.0: real time, max: as fast as can be, auto: 1.0 on the bus, else max");
     v("name", name, "prefix of the camera's frames; empty: as calibrated, else cam");
@@ -62,6 +65,24 @@ struct CameraSection {
     v("frame_rate", frame_rate, "of images that have no stamps [Hz]");
     v("live", live, "real cameras of all kinds");
     v("v4l2", v4l2, "cameras on USB and others that the kernel knows");
+  }
+};
+
+/// How a recording is played back.
+struct ReplaySection {
+  std::string path;
+  std::string rate = "1";
+  double start = 0.0;
+  bool loop = false;
+  bool all = false;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("path", path, "recording: a folder or an .mcap file");
+    v("rate", rate, "speed: 1 is real time, max as fast as the odometry goes");
+    v("start", start, "left out at the beginning [s]");
+    v("loop", loop, "begin again at the end");
+    v("all", all, "also topics that others on the bus write now, and recorded commands");
   }
 };
 
@@ -130,6 +151,8 @@ struct AppConfig {
   StereoOdometryConfig odometry;  ///< Its keys stand at the top level of the file.
   CameraSection camera;
   sim::SimConfig sim;
+  bridge::RecorderConfig record;
+  ReplaySection replay;
   OutputSection output;
   NodeSection node;
   DashboardSection dashboard;
@@ -142,6 +165,8 @@ struct AppConfig {
     odometry.visit(v);
     v("camera", camera, "source of frames");
     v("sim", sim, "simulated cameras");
+    v("record", record, "recording of topics");
+    v("replay", replay, "playing back of recordings");
     v("output", output, "files that a run leaves");
     v("node", node, "what only a process on the bus has");
     v("dashboard", dashboard, "web page and Foxglove port");

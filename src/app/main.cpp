@@ -34,6 +34,10 @@ int run(int argc, char** argv) {
   add_topic_command(root);
   add_command_command(root);
   add_dashboard_command(root);
+  add_record_command(root);
+  add_replay_command(root);
+  add_recover_command(root);
+  add_replay_test_command(root);
   add_eval_command(root);
   add_bench_command(root);
   add_calib_command(root);

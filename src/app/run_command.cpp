@@ -7,6 +7,7 @@
 #include "sovo/app/config_options.h"
 #include "sovo/app/failure.h"
 #include "sovo/app/frame_input.h"
+#include "sovo/app/mcap_input.h"
 #include "sovo/app/odometry_session.h"
 #include "sovo/app/progress.h"
 #include "sovo/app/stop_signal.h"
@@ -43,9 +44,11 @@ bool feed(FrameSource& source, OdometrySession& session, StopSignal& stop) {
 }
 
 int run(AppConfig config, bool simulated) {
-  if (!simulated && config.camera.path.empty()) {
+  const bool recorded = !simulated && !config.camera.mcap.empty();
+  if (!simulated && !recorded && config.camera.path.empty()) {
     return fail(kUsage,
-                "no source given; use --dataset FOLDER, or --world NAME for a simulated one");
+                "no source given; use --dataset FOLDER, --mcap RECORDING, or --world NAME for a "
+                "simulated one");
   }
   if (simulated && !config.camera.path.empty()) {
     return fail(kUsage, "two sources given: --dataset (camera.path) and --world; leave one out");
@@ -54,8 +57,9 @@ int run(AppConfig config, bool simulated) {
     return fail(kUsage, writable.error());
   }
   StopSignal stop;  // before the threads of source and odometry
-  auto input =
-      simulated ? open_sim_input(config, 0.0, true) : open_dataset_input(config.camera, 0.0);
+  auto input = simulated  ? open_sim_input(config, 0.0, true)
+               : recorded ? open_mcap_input(config.camera)
+                          : open_dataset_input(config.camera, 0.0);
   if (!input) return fail(kBadInput, input.error());
   // As fast as can be means that the source waits for the odometry and nothing is dropped.
   if (input->rate == 0.0) config.odometry.wait_for_mapping = true;
@@ -70,9 +74,10 @@ int run(AppConfig config, bool simulated) {
 
 void add_run_command(const Command& program) {
   const Command command = program.add_command(
-      "run", "Run the odometry on a dataset or a simulated world, in one process");
+      "run", "Run the odometry on a dataset, recording or simulated world, in one process");
   auto options = std::make_shared<ConfigOptions>(command);
   options->value("--dataset", "camera.path", "Folder of the dataset", "DIR")
+      .value("--mcap", "camera.mcap", "Recording: an .mcap file or a folder", "FILE|DIR")
       .value("--rate", "camera.rate", "Speed: 1.0 is real time, max as fast as can be", "X|max");
   add_sim_options(*options);
   add_dataset_options(*options);

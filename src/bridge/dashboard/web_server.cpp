@@ -151,7 +151,6 @@ class WebSocketConnection : public WebSocketHandle,
 
   void close() {
     closing_ = true;
-    leave();  // a client that does not answer the close frame keeps nothing busy
     socket_.async_close(websocket::close_code::protocol_error,
                         [self = this->shared_from_this()](error_code) { self->end(); });
   }
@@ -174,14 +173,10 @@ class WebSocketConnection : public WebSocketHandle,
   }
 
   void end() {
-    leave();
-    beast::get_lowest_layer(socket_).cancel();
-  }
-
-  void leave() {
     if (std::exchange(ended_, true)) return;
     upgrade_.client->closed();
     context_.clients.erase(upgrade_.client);
+    beast::get_lowest_layer(socket_).cancel();
   }
 
   websocket::stream<Stream> socket_;

@@ -7,8 +7,8 @@
 #include "sovo/app/commands.h"
 #include "sovo/app/config_options.h"
 #include "sovo/app/failure.h"
-#include "sovo/app/status_line.h"
 #include "sovo/app/stop_signal.h"
+#include "sovo/app/terminal_line.h"
 #include "sovo/bridge/recorder.h"
 
 namespace sovo::app {
@@ -63,7 +63,7 @@ class RecorderView {
   std::set<std::string> named_;
   std::string file_;
   bool was_recording_ = false;
-  StatusLine line_;
+  TerminalLine line_;
   Clock::time_point last_ = Clock::now();
   std::uint64_t last_bytes_ = 0;
   std::uint64_t rate_ = 0;

@@ -7,8 +7,8 @@
 #include "sovo/app/failure.h"
 #include "sovo/app/frame_input.h"
 #include "sovo/app/replayer.h"
-#include "sovo/app/status_line.h"
 #include "sovo/app/stop_signal.h"
+#include "sovo/app/terminal_line.h"
 
 namespace sovo::app {
 namespace {
@@ -29,7 +29,7 @@ int replay(const AppConfig& config) {
   auto replayer = Replayer::open(*participant, section, *rate);
   if (!replayer) return fail(kBadInput, replayer.error());
   for (const std::string& note : (*replayer)->notes()) spdlog::warn("{}", note);
-  StatusLine line;
+  TerminalLine line;
   Replayer::State state;
   do {
     const auto played = (*replayer)->play(stop, [&](const Replayer::State& now) {

@@ -15,9 +15,9 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto kPoll = 2ms;  // of the other side and of calibrations
+constexpr auto kPairPoll = 2ms;  // of the other side and of calibrations
 constexpr std::size_t kMostReasons = 64;
-constexpr std::size_t kMostReports = 16;
+constexpr std::size_t kMostPairReports = 16;
 constexpr std::int64_t kHistoryNs = 10'000'000'000;  // older stamps are those of a recording
 
 /// "camera_info" beside an image topic.
@@ -108,7 +108,7 @@ FeedCounters RosStereoSubscriber::counters() const {
 void RosStereoSubscriber::receive() {
   while (!stopping_) {
     try {
-      left_->images.wait(kPoll);
+      left_->images.wait(kPairPoll);
       work();
     } catch (const std::exception& e) {
       push({{SourceState::kFailed, {}, std::string("receiving images failed: ") + e.what()}, 0});
@@ -240,7 +240,7 @@ void RosStereoSubscriber::push(Item item) {
     return (other.result.state == SourceState::kFrame) == is_frame;
   };
   const auto waiting = std::count_if(queue_.begin(), queue_.end(), same_kind);
-  const auto most = is_frame ? std::max(config_.queue, 1) : static_cast<int>(kMostReports);
+  const auto most = is_frame ? std::max(config_.queue, 1) : static_cast<int>(kMostPairReports);
   if (waiting >= most) {
     queue_.erase(std::find_if(queue_.begin(), queue_.end(), same_kind));
     if (is_frame) ++counters_.dropped_queue;

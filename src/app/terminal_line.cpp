@@ -1,4 +1,4 @@
-#include "sovo/app/status_line.h"
+#include "sovo/app/terminal_line.h"
 
 #include <spdlog/fmt/fmt.h>
 #include <unistd.h>
@@ -7,13 +7,13 @@
 
 namespace sovo::app {
 
-StatusLine::StatusLine() : enabled_(isatty(STDERR_FILENO) == 1) {}
+TerminalLine::TerminalLine() : enabled_(isatty(STDERR_FILENO) == 1) {}
 
-StatusLine::~StatusLine() {
+TerminalLine::~TerminalLine() {
   if (shown_) std::cerr << "\r\x1b[K" << std::flush;
 }
 
-void StatusLine::show(const std::string& text) {
+void TerminalLine::show(const std::string& text) {
   const auto now = std::chrono::steady_clock::now();
   if (!enabled_ || now - last_ < std::chrono::milliseconds(200)) return;
   last_ = now;

@@ -6,12 +6,12 @@
 namespace sovo::app {
 
 /// One line on the terminal that is written over; nothing where stderr is not a terminal.
-class StatusLine {
+class TerminalLine {
  public:
-  StatusLine();
-  ~StatusLine();
-  StatusLine(const StatusLine&) = delete;
-  StatusLine& operator=(const StatusLine&) = delete;
+  TerminalLine();
+  ~TerminalLine();
+  TerminalLine(const TerminalLine&) = delete;
+  TerminalLine& operator=(const TerminalLine&) = delete;
 
   /// Shows `text`, at most five times a second.
   void show(const std::string& text);

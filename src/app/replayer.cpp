@@ -18,9 +18,9 @@ namespace {
 using namespace std::chrono_literals;
 namespace topics = bridge::topics;
 
-constexpr auto kPatience = 5s;
-constexpr auto kLookPeriod = 500ms;
-constexpr auto kSlice = 20ms;
+constexpr auto kReplayPatience = 5s;
+constexpr auto kLookPeriod = 200ms;
+constexpr auto kReplaySlice = 20ms;
 constexpr std::uint64_t kClockPeriodNs = 10'000'000;
 constexpr char kFrameType[] = "sovo_msgs/msg/StereoFrame";
 
@@ -73,7 +73,7 @@ Result<void> Replayer::open_outputs() {
     auto writer = bridge::RawWriter::open(participant_, name, schema, qos);
     if (!writer) return writer.failure();
     outputs_[name] = {std::make_shared<bridge::RawWriter>(std::move(*writer)), qos.latched,
-                      is_one_of(kOfVo, name)};
+                      is_one_of(kOfVo, name), topic.type == kFrameType};
   }
   return {};
 }
@@ -95,24 +95,42 @@ void Replayer::look_for_vo() {
   vo_is_live_ = live;
 }
 
-/// The first frames would go unheard while the processes find each other.
+/// Whether somebody reads the frames, or, in a recording without any, another topic.
+bool Replayer::is_heard() const {
+  const bool frames = std::any_of(outputs_.begin(), outputs_.end(),
+                                  [](const auto& output) { return output.second.frames; });
+  return std::any_of(outputs_.begin(), outputs_.end(), [frames](const auto& output) {
+    return output.second.frames == frames && output.second.writer->num_readers() > 0;
+  });
+}
+
+/// The first frames would go unheard while the processes find each other, and unpaced while the
+/// odometry's status is not found.
 void Replayer::wait_for_listener(const Stop& stop) {
   const auto begin = Clock::now();
-  const auto listened_to = [this] {
-    return std::any_of(outputs_.begin(), outputs_.end(),
-                       [](const auto& output) { return output.second.writer->num_readers() > 0; });
-  };
-  while (!stop() && Clock::now() - begin < kPatience) {
+  const bool follow = rate_ == 0.0;
+  while (!stop() && Clock::now() - begin < kReplayPatience) {
     look_for_vo();
-    if (listened_to() && Clock::now() - begin > kLookPeriod) return;
-    std::this_thread::sleep_for(kSlice);
+    if (is_heard() && (vo_is_live_ || !follow)) return;
+    std::this_thread::sleep_for(kReplaySlice);
   }
-  if (!listened_to()) {
-    spdlog::warn("nobody listens after {} s; publishing all the same", kPatience.count());
+  if (!is_heard()) {
+    spdlog::warn("nobody listens after {} s; publishing all the same", kReplayPatience.count());
+  } else if (follow) {
+    spdlog::warn("no odometry after {} s; publishing without waiting for one",
+                 kReplayPatience.count());
   }
 }
 
-/// What late readers would have got of the time before the start.
+/// When the first frame from the start on was recorded; the start in a recording without frames.
+std::uint64_t Replayer::first_frame_ns() {
+  recording_->seek(from_ns_, [](const RecordedTopic& topic) { return topic.type == kFrameType; });
+  const auto frame = recording_->next();
+  return frame ? frame->log_ns : from_ns_;
+}
+
+/// What late readers would have got of the time before the first frame: an odometry begins, and can
+/// be waited for, when it has heard the calibration.
 Result<void> Replayer::publish_latched(std::uint64_t before_ns) {
   recording_->seek(0, [this](const RecordedTopic& topic) {
     const auto output = outputs_.find(topic.topic);
@@ -154,7 +172,7 @@ void Replayer::pace(const RecordedMessage& message, const Stop& stop) {
   const double ahead_ns = static_cast<double>(message.log_ns - from_ns_) / rate_;
   const auto due = began_ + std::chrono::nanoseconds(static_cast<std::int64_t>(ahead_ns));
   while (!stop() && Clock::now() < due) {
-    std::this_thread::sleep_for(std::min<Clock::duration>(due - Clock::now(), kSlice));
+    std::this_thread::sleep_for(std::min<Clock::duration>(due - Clock::now(), kReplaySlice));
   }
 }
 
@@ -167,20 +185,21 @@ Result<void> Replayer::tell_time(std::uint64_t log_ns) {
 }
 
 Result<void> Replayer::play(const Stop& stop, const std::function<void(const State&)>& progress) {
-  wait_for_listener(stop);
   const std::uint64_t start = recording_->start_ns();
   from_ns_ = start + static_cast<std::uint64_t>(config_.start * 1e9);
   next_clock_ns_ = 0;
   state_.duration_s = recording_->duration_s();
-  if (from_ns_ > start) {
-    if (auto done = publish_latched(from_ns_); !done) return done;
-  }
+  const std::uint64_t first_frame = first_frame_ns();
+  if (auto done = publish_latched(first_frame); !done) return done;
+  wait_for_listener(stop);
   recording_->seek(from_ns_,
                    [this](const RecordedTopic& topic) { return outputs_.contains(topic.topic); });
   began_ = Clock::now();
   while (!stop()) {
     const auto message = recording_->next();
     if (!message) break;
+    const bool said = outputs_.at(message->topic->topic).latched && message->log_ns < first_frame;
+    if (said) continue;
     look_for_vo();
     pace(*message, stop);
     if (auto done = tell_time(message->log_ns); !done) return done;

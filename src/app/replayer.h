@@ -42,7 +42,8 @@ class Replayer {
   struct Output {
     std::shared_ptr<bridge::RawWriter> writer;
     bool latched = false;
-    bool of_vo = false;  ///< Left out while a live odometry is on the bus.
+    bool of_vo = false;   ///< Left out while a live odometry is on the bus.
+    bool frames = false;  ///< Of a camera.
   };
   using Clock = std::chrono::steady_clock;
 
@@ -58,7 +59,9 @@ class Replayer {
 
   Result<void> open_outputs();
   void look_for_vo();
+  bool is_heard() const;
   void wait_for_listener(const Stop& stop);
+  std::uint64_t first_frame_ns();
   Result<void> publish_latched(std::uint64_t before_ns);
   Result<void> publish(const RecordedMessage& message);
   void follow_vo(const RecordedMessage& message, const Stop& stop);

@@ -32,6 +32,7 @@ using tcp = asio::ip::tcp;
 using boost::system::error_code;
 
 constexpr std::chrono::seconds kRequestTimeout(20);
+constexpr std::chrono::seconds kGoodbyeTimeout(5);
 constexpr std::uint32_t kMaxHeaderBytes = 16U << 10U;
 constexpr std::uint64_t kMaxBodyBytes = 1024;
 
@@ -110,6 +111,7 @@ class WebSocketConnection : public WebSocketHandle,
     auto timeout = websocket::stream_base::timeout::suggested(beast::role_type::server);
     timeout.idle_timeout = std::chrono::seconds(60);
     timeout.keep_alive_pings = true;
+    timeout.handshake_timeout = kGoodbyeTimeout;
     socket_.set_option(timeout);
     socket_.read_message_max(context_.config.max_message_bytes);
     socket_.set_option(websocket::stream_base::decorator([this](websocket::response_type& r) {
@@ -149,8 +151,10 @@ class WebSocketConnection : public WebSocketHandle,
     });
   }
 
+  /// One that broke the protocol is a client no more, however long it takes to say goodbye.
   void close() {
     closing_ = true;
+    forget();
     socket_.async_close(websocket::close_code::protocol_error,
                         [self = this->shared_from_this()](error_code) { self->end(); });
   }
@@ -172,10 +176,13 @@ class WebSocketConnection : public WebSocketHandle,
     });
   }
 
+  void forget() {
+    if (context_.clients.erase(upgrade_.client) > 0) upgrade_.client->closed();
+  }
+
   void end() {
     if (std::exchange(ended_, true)) return;
-    upgrade_.client->closed();
-    context_.clients.erase(upgrade_.client);
+    forget();
     beast::get_lowest_layer(socket_).cancel();
   }
 

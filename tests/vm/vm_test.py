@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Real camera drivers of the kernel in a virtual machine, and what camera_check sees of them.
 
-Usage: vm_test.py --bin DIRECTORY --work DIRECTORY [--only CASE]
+Usage: vm_test.py --bin DIRECTORY --work DIRECTORY [--prepare]
 
 Needs qemu-system-x86, busybox-static, cpio, kmod, v4l-utils and linux-headers-amd64; the kernel
-and the sources of v4l2loopback are fetched with apt once, into the work directory. Without any of
-these it says so and ends with 77. SOVO_TEST_LONG=1 runs the long forms.
+and the sources of v4l2loopback are fetched with apt once, into the work directory; --prepare
+does no more than that, where there is a network. Without any of these it says so and ends with 77. SOVO_TEST_LONG=1 runs the long forms.
 """
 
 import argparse
@@ -252,12 +252,15 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--bin", required=True)
     parser.add_argument("--work", required=True)
+    parser.add_argument("--prepare", action="store_true")
     options = parser.parse_args()
     try:
         Cameras.machine = Machine(options.bin, options.work)
     except Missing as missing:
         print(f"Skipped\n{missing}")
         return SKIPPED
+    if options.prepare:
+        return 0
     suite = unittest.defaultTestLoader.loadTestsFromTestCase(Cameras)
     done = unittest.TextTestRunner(verbosity=2, stream=sys.stdout).run(suite)
     return 0 if done.wasSuccessful() else 1

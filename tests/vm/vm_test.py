@@ -5,7 +5,8 @@ Usage: vm_test.py --bin DIRECTORY --work DIRECTORY [--prepare]
 
 Needs qemu-system-x86, busybox-static, cpio, kmod, v4l-utils and linux-headers-amd64; the kernel
 and the sources of v4l2loopback are fetched with apt once, into the work directory; --prepare
-does no more than that, where there is a network. Without any of these it says so and ends with 77. SOVO_TEST_LONG=1 runs the long forms.
+does no more than that, where there is a network. Without any of these it says so and ends with 77.
+SOVO_TEST_LONG=1 runs the long forms.
 """
 
 import argparse

@@ -23,7 +23,7 @@ PointsInView points_in_view(const OdometryOutput& output, const KeyframeOutput& 
                             const CameraModel& tracked, const CameraModel& raw_left);
 
 /// Points of a keyframe in the axes of odom as a PointCloud2 (x, y, z [m] and intensity, all
-/// float32), with the memory that it borrows (borrow.h).
+/// float32), with the memory that it borrows (borrow.h); `frames` must outlive it.
 class PointCloudMessage {
  public:
   PointCloudMessage(const KeyframeOutput& keyframe, const CameraModel& tracked,

@@ -78,7 +78,8 @@ TEST(PointsInView, OfAnotherSegmentOrWithoutAPoseAreNone) {
 }
 
 TEST(PointCloud, HoldsThePointsInTheAxesOfOdom) {
-  const PointCloudMessage cloud(test_keyframe(), tracked_camera(), body_from_optical(), {});
+  const OdometryFrames frames;
+  const PointCloudMessage cloud(test_keyframe(), tracked_camera(), body_from_optical(), frames);
   const msg::PointCloud2& m = cloud.message();
   ASSERT_EQ(m.width, 2U);
   ASSERT_EQ(m.data._length, 2 * m.point_step);

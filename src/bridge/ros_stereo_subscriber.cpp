@@ -58,8 +58,9 @@ Result<void> RosStereoSubscriber::open_side(bool is_left) {
   if (!images) return images.failure();
   auto infos = Reader<msg::CameraInfo>::open(participant_, info_topic(topic), {4, false, true});
   if (!infos) return infos.failure();
-  (is_left ? left_ : right_)
-      .reset(new Side{images->topic(), std::move(*images), std::move(*infos), std::nullopt});
+  const std::string name = images->topic();
+  (is_left ? left_ : right_) = std::make_unique<Side>(
+      Side{name, std::move(*images), std::move(*infos), std::nullopt, false, 0});
   return {};
 }
 

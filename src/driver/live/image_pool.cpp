@@ -1,7 +1,5 @@
 #include "sovo/driver/live/image_pool.h"
 
-#include <atomic>
-
 namespace sovo {
 
 ImagePool::ImagePool(std::size_t count, std::size_t bytes) {
@@ -13,12 +11,10 @@ ImagePool::ImagePool(std::size_t count, std::size_t bytes) {
 
 ImagePool::Buffer ImagePool::take() {
   for (std::size_t i = 0; i < buffers_.size(); ++i) {
-    const Buffer& buffer = buffers_[next_];
+    // Counting this copy is what makes the last reader's use of the pixels happen before ours.
+    Buffer buffer = buffers_[next_];
     next_ = (next_ + 1) % buffers_.size();
-    if (buffer.use_count() != 1) continue;
-    // The last reader's use of the pixels happens before ours.
-    std::atomic_thread_fence(std::memory_order_acquire);
-    return buffer;
+    if (buffer.use_count() == 2) return buffer;
   }
   return nullptr;
 }

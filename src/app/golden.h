@@ -36,7 +36,7 @@ struct Golden {
 
 std::string to_json(const Golden& golden);
 /// `name` is for the error text.
-Result<Golden> parse_golden(const std::string& json, const std::string& name);
+Result<Golden> parse_golden(const std::string& text, const std::string& name);
 
 /// What the first frame that differs by more than the tolerances of `expected` is, and how;
 /// nothing when there is none.

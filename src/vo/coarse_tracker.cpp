@@ -304,17 +304,25 @@ CoarseTracker::LevelOutcome CoarseTracker::align_level(const TrackingReference& 
   double energy = now.energy + prior_energy(*affine, now.in_view);
 
   double lambda = kStartLambda;
+  bool accepted = false;
   for (int it = 0; it < kMaxIterations[static_cast<std::size_t>(std::min(level, 5))]; ++it) {
     const Vec8 gradient = now.b + prior.cwiseProduct(prior_error(*affine));
     const Vec8 step = damped_step(now.H, gradient, prior, units, lambda);
     const Vec8 x = units.cwiseProduct(step);
+    const bool converged = !(step.norm() > kStopNorm);
 
     const SE3 new_T = SE3::exp(x.head<6>()) * *T;
     const Affine new_affine{affine->a + x[6], affine->b + x[7]};
+    if (converged && accepted) {  // moves too little to be measured
+      *T = new_T;
+      *affine = new_affine;
+      break;
+    }
     Linearization next;
     residuals(points, image, new_T, transfer_of(new_affine), *cutoff, &next);
     const double new_energy = next.energy + prior_energy(new_affine, next.in_view);
-    if (new_energy < energy) {
+    accepted = new_energy < energy;
+    if (accepted) {
       normal_equations(transfer_of(new_affine), reference.affine.b, &next);
       now = next;
       energy = new_energy;
@@ -324,7 +332,7 @@ CoarseTracker::LevelOutcome CoarseTracker::align_level(const TrackingReference& 
     } else {
       lambda = std::max(lambda * 4.0, kMinRejectLambda);
     }
-    if (!(step.norm() > kStopNorm)) break;
+    if (converged) break;
   }
   out.last = now;
   out.rmse = std::sqrt(now.energy);

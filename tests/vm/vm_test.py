@@ -184,10 +184,10 @@ class Cameras(unittest.TestCase):
         if "GUEST ENDED with 0" not in cls.output:
             return "the machine did not end as it should"
         for case in ("zed_stream", "loopback"):
-            missing = next((json.loads(line[7:])["missing"] for line in cls.cases.get(case, [])
-                            if line.startswith("RESULT ")), 0)
-            if missing:
-                return f"{case} missed {missing} images"
+            for line in cls.cases.get(case, []):
+                result = json.loads(line[7:]) if line.startswith("RESULT ") else {}
+                if result.get("missing") or result.get("uncounted"):
+                    return f"{case} lost images: {line}"
         return None
 
     def lines(self, case):

@@ -71,18 +71,19 @@ MapSegment::MapSegment(const StereoOdometryConfig& config, const FramePreparatio
       filter_(config.filter) {}
 
 bool MapSegment::initialize(const MonoFrame& frame, const SideImage* right) {
-  if (!two_view_) {
-    if (config_.init != InitMethod::kTwoView && right != nullptr &&
-        initialize_from_stereo(frame, *right)) {
-      return true;
-    }
-    if (config_.init == InitMethod::kStereo) {
-      if (right == nullptr) reason_ = "waiting for a right image to begin from stereo depth";
-      return false;
-    }
-    two_view_ = true;
+  // Two views take their time; meanwhile a camera may be uncovered, or come to another texture.
+  constexpr std::uint32_t kStereoEvery = 5;
+  const bool only_stereo = config_.init == InitMethod::kStereo;
+  const bool due = only_stereo || attempts_++ % kStereoEvery == 0;
+  if (config_.init != InitMethod::kTwoView && right != nullptr && due &&
+      initialize_from_stereo(frame, *right)) {
+    two_view_initializer_.reset();
+    two_view_first_.reset();
+    return true;
   }
-  return initialize_from_two_views(frame, right);
+  if (!only_stereo) return initialize_from_two_views(frame, right);
+  if (right == nullptr) reason_ = "waiting for a right image to begin from stereo depth";
+  return false;
 }
 
 bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage& right) {

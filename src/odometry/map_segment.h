@@ -108,7 +108,7 @@ class MapSegment {
 
   bool initialized_ = false;
   bool broken_ = false;
-  bool two_view_ = false;
+  std::uint32_t attempts_ = 0;  ///< Frames given to `initialize`.
   std::string reason_;
   std::unique_ptr<TwoViewInitializer> two_view_initializer_;
   std::unique_ptr<PixelSelector> two_view_selector_;

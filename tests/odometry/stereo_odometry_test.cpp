@@ -251,6 +251,23 @@ TEST(StereoOdometry, AfterALossANewSegmentBeginsWhereTheOldOneEnded) {
   EXPECT_NEAR(drive_error({refined.begin() + 6, refined.end()}).scale, 1.0, 0.05);
 }
 
+TEST(StereoOdometry, ACoveredCameraThatIsUncoveredBeginsFromStereoWithoutMotion) {
+  Playback run(test_config());
+  const auto dark = [](int x, int y) { return 4 + (7 * x + 13 * y) % 3; };
+  for (int i = 0; i < 7; ++i) {
+    EXPECT_EQ(run.give(with_left(drive_frame(i), dark)).state, OdometryState::kInitializing);
+  }
+  OdometryOutput last;
+  for (int i = 7; i < 13; ++i) {
+    StereoFrame still = drive_frame(7);
+    still.stamp_ns = drive_frame(i).stamp_ns;
+    last = run.give(still);
+  }
+  EXPECT_EQ(last.state, OdometryState::kTracking) << last.reason;
+  EXPECT_TRUE(last.pose_valid);
+  EXPECT_TRUE(last.scale_valid);
+}
+
 TEST(StereoOdometry, OneUnrelatedFrameLosesNoMap) {
   Playback run(test_config());
   run.give_drive(0, 6);

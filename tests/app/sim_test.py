@@ -49,6 +49,53 @@ class SimulatedRun(SimTest):
         self.assertLess(largest_error(poses, truth, poses[-1][0]), 0.03)
 
 
+class SimulatedFaults(SimTest):
+    """What happens to cameras in the field, on the walk over grass at 20 Hz."""
+
+    FRAMES = 90
+
+    def fly(self, **sensor):
+        truth, live, scales = (self.folder / n for n in ("truth.txt", "live.txt", "scales.csv"))
+        settings = [part for key, value in sensor.items()
+                    for part in ("--set", f"sim.sensor.{key}={value}")]
+        result = sovo("run", "--deterministic", "--world", "lawn", "--calib", self.calibration,
+                      "--frames", self.FRAMES, "--truth", truth, "--out-live", live,
+                      "--keyframes", scales, *settings)
+        self.expect(result, OK)
+        start = float(read_tum(truth)[0][0])
+        verdicts = [(float(line.split(",")[0]) - start, line.strip().split(",")[3])
+                    for line in scales.read_text().splitlines()[1:]]
+        return result.stderr, read_tum(truth), read_tum(live), verdicts
+
+    def test_lost_pairs_lose_nothing_else(self):
+        log, truth, live, verdicts = self.fly(drop_rate=0.3)
+        self.assertLess(len(live), 0.85 * self.FRAMES)
+        self.assertNotIn("LOST", log)
+        self.assertLess(largest_error(live, truth, live[0][0]), 0.05)
+        self.assertEqual({v for _, v in verdicts}, {"accepted"})
+
+    def test_the_right_camera_goes_dark(self):
+        log, truth, live, verdicts = self.fly(dark="right", dark_from_s=1.5, dark_until_s=3)
+        self.assertNotIn("LOST", log)
+        self.assertEqual(len(live), self.FRAMES)
+        self.assertLess(largest_error(live, truth, live[0][0]), 0.05)
+        for when, verdict in verdicts:
+            dark = 1.5 <= when < 3
+            self.assertFalse(dark and verdict == "accepted", f"{verdict} after {when} s")
+        self.assertIn("accepted", [v for when, v in verdicts if when > 3.2])
+
+    def test_the_left_camera_goes_dark(self):
+        log, truth, live, _ = self.fly(dark="left", dark_from_s=1.5, dark_until_s=2.2)
+        self.assertIn("a new segment begins", log)
+        start = float(truth[0][0])
+        times = [float(p[0]) - start for p in live]
+        self.assertEqual([t for t in times if 1.5 <= t < 2.2], [])
+        again = [p for p in live if float(p[0]) - start > 3.2]
+        self.assertGreater(len(again), 20)
+        # The new segment begins where the old one ended, and is as true as the old one.
+        self.assertLess(largest_error(again, truth, again[0][0]), 0.05)
+
+
 class SimulatedExport(SimTest):
     def test_what_is_exported_runs_like_the_world_itself(self):
         folder, out, again = (self.folder / n for n in ("dataset", "out.txt", "again.txt"))

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <functional>
+#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
@@ -50,6 +51,12 @@ class AravisTest : public ::testing::Test {
     while (frames.size() < count && std::chrono::steady_clock::now() < end) {
       auto next = source->next(std::chrono::milliseconds(100));
       if (next.state != SourceState::kFrame || !wanted(next.frame)) continue;
+      // The camera's own buffers are needed for what comes.
+      for (SideImage* image : {&next.frame.left, &next.frame.right}) {
+        if (image->data) {
+          image->data = std::make_shared<const std::vector<std::uint8_t>>(*image->data);
+        }
+      }
       frames.push_back(std::move(next.frame));
     }
     return frames;

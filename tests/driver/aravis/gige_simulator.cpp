@@ -433,6 +433,8 @@ void GigeSimulator::write_register(std::uint32_t address, std::uint32_t value) {
   // It has no gain above 10.
   if (address == kGain && std::bit_cast<float>(value) > 10.0F)
     value = std::bit_cast<std::uint32_t>(10.0F);
+  if (address == kWidth) value = std::min(value, static_cast<std::uint32_t>(config_.width));
+  if (address == kHeight) value = std::min(value, static_cast<std::uint32_t>(config_.height));
   put(address, value);
   if (address == kAcquisitionStart) {
     acquiring_ = true;

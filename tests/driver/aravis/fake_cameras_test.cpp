@@ -10,16 +10,16 @@
 namespace sovo {
 namespace {
 
-constexpr int kWidth = 640;
-constexpr int kHeight = 480;
-constexpr std::int64_t kPeriodUs = 33'333;
-constexpr std::size_t kDisparity = 24;
+constexpr int kFakeWidth = 640;
+constexpr int kFakeHeight = 480;
+constexpr std::int64_t kFakePeriodUs = 33'333;
+constexpr std::size_t kFakeDisparity = 24;
 
 /// A row of noise that moves by three pixels an instant, seen by two cameras: what is at x in the
 /// right image is at x + disparity in the left one.
-class Scene {
+class NoiseScene {
  public:
-  Scene() : noise_(1U << 16U) {
+  NoiseScene() : noise_(1U << 16U) {
     std::uint32_t state = 1;
     for (std::uint8_t& value : noise_) {
       state = state * 1664525U + 1013904223U;
@@ -28,10 +28,10 @@ class Scene {
   }
 
   void draw(std::uint64_t instant, bool right, std::uint8_t* pixels) const {
-    for (std::size_t y = 0; y < kHeight; ++y) {
-      const std::size_t row = y * 131 + 3 * instant + (right ? kDisparity : 0);
-      for (std::size_t x = 0; x < kWidth; ++x) {
-        pixels[y * kWidth + x] = noise_[(row + x) % noise_.size()];
+    for (std::size_t y = 0; y < kFakeHeight; ++y) {
+      const std::size_t row = y * 131 + 3 * instant + (right ? kFakeDisparity : 0);
+      for (std::size_t x = 0; x < kFakeWidth; ++x) {
+        pixels[y * kFakeWidth + x] = noise_[(row + x) % noise_.size()];
       }
     }
     std::memcpy(pixels, &instant, sizeof instant);
@@ -44,14 +44,14 @@ class Scene {
 /// libaravis' own fake camera, which shows a scene.
 class FakeCamera {
  public:
-  FakeCamera(const char* address, const char* serial, bool right, const Scene& scene)
+  FakeCamera(const char* address, const char* serial, bool right, const NoiseScene& scene)
       : right_(right), scene_(scene), camera_(arv_gv_fake_camera_new(address, serial)) {
     ArvFakeCamera* fake = arv_gv_fake_camera_get_fake_camera(camera_);
     for (const auto& [address_of, value] :
-         {std::pair{ARV_FAKE_CAMERA_REGISTER_SENSOR_WIDTH, kWidth},
-          std::pair{ARV_FAKE_CAMERA_REGISTER_SENSOR_HEIGHT, kHeight},
-          std::pair{ARV_FAKE_CAMERA_REGISTER_WIDTH, kWidth},
-          std::pair{ARV_FAKE_CAMERA_REGISTER_HEIGHT, kHeight}}) {
+         {std::pair{ARV_FAKE_CAMERA_REGISTER_SENSOR_WIDTH, kFakeWidth},
+          std::pair{ARV_FAKE_CAMERA_REGISTER_SENSOR_HEIGHT, kFakeHeight},
+          std::pair{ARV_FAKE_CAMERA_REGISTER_WIDTH, kFakeWidth},
+          std::pair{ARV_FAKE_CAMERA_REGISTER_HEIGHT, kFakeHeight}}) {
       arv_fake_camera_write_register(fake, address_of, static_cast<guint32>(value));
     }
     arv_fake_camera_set_fill_pattern(fake, fill, this);
@@ -66,25 +66,25 @@ class FakeCamera {
   /// The two run by themselves; what they show is of the last whole multiple of the period.
   static void fill(ArvBuffer* buffer, void* self, guint32, guint32, ArvPixelFormat) {
     const auto* camera = static_cast<const FakeCamera*>(self);
-    const auto instant = static_cast<std::uint64_t>(g_get_real_time() / kPeriodUs);
+    const auto instant = static_cast<std::uint64_t>(g_get_real_time() / kFakePeriodUs);
     // Until the driver has set it up, it may be asked for images of another size.
-    if (arv_buffer_get_image_width(buffer) != kWidth) return;
-    if (arv_buffer_get_image_height(buffer) != kHeight) return;
+    if (arv_buffer_get_image_width(buffer) != kFakeWidth) return;
+    if (arv_buffer_get_image_height(buffer) != kFakeHeight) return;
     const void* data = arv_buffer_get_data(buffer, nullptr);
     camera->scene_.draw(instant, camera->right_,
                         static_cast<std::uint8_t*>(const_cast<void*>(data)));
-    arv_buffer_set_timestamp(buffer, instant * static_cast<std::uint64_t>(kPeriodUs) * 1000U);
+    arv_buffer_set_timestamp(buffer, instant * static_cast<std::uint64_t>(kFakePeriodUs) * 1000U);
   }
 
   bool right_;
-  const Scene& scene_;
+  const NoiseScene& scene_;
   ArvGvFakeCamera* camera_;
 };
 
 using FakeCameras = AravisTest;
 
 TEST_F(FakeCameras, EveryPairShowsOneInstant) {
-  const Scene scene;
+  const NoiseScene scene;
   FakeCamera left("127.0.0.2", "LEFT", false, scene);
   FakeCamera right("127.0.0.3", "RIGHT", true, scene);
   if (!left.is_running() || !right.is_running()) {
@@ -94,12 +94,12 @@ TEST_F(FakeCameras, EveryPairShowsOneInstant) {
   options_.frame_rate = 30.0;
   // Larger ones take more of the socket's buffer on the loopback interface than they carry.
   options_.packet_size = 1400;
-  auto opened = open(kWidth, kHeight);
+  auto opened = open(kFakeWidth, kFakeHeight);
   ASSERT_TRUE(opened) << opened.error();
   LiveSource& source = *opened->source;
   const bool longer = std::getenv("SOVO_TEST_LONG") != nullptr;
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(longer ? 60 : 5);
-  std::vector<std::uint8_t> wanted(std::size_t{kWidth} * kHeight);
+  std::vector<std::uint8_t> wanted(std::size_t{kFakeWidth} * kFakeHeight);
   std::size_t pairs = 0;
   double worst_error = 0.0;
   while (std::chrono::steady_clock::now() < end || pairs < 10) {
@@ -114,7 +114,7 @@ TEST_F(FakeCameras, EveryPairShowsOneInstant) {
       const SideImage& image = is_right ? next.frame.right : next.frame.left;
       scene.draw(instant, is_right, wanted.data());
       const auto odd = std::mismatch(wanted.begin(), wanted.end(), image.data->begin());
-      ASSERT_EQ(odd.first - wanted.begin(), std::ptrdiff_t{kWidth} * kHeight)
+      ASSERT_EQ(odd.first - wanted.begin(), std::ptrdiff_t{kFakeWidth} * kFakeHeight)
           << "right: " << is_right << ", pair " << pairs;
     }
   }

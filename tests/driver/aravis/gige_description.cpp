@@ -6,7 +6,7 @@
 
 #include "driver/aravis/gige_simulator.h"
 
-namespace sovo {
+namespace sovo::gige {
 namespace {
 
 std::string hex(unsigned value) {
@@ -121,4 +121,4 @@ std::string gige_description(const GigeSimulatorConfig& config) {
   return text + "</RegisterDescription>\n";
 }
 
-}  // namespace sovo
+}  // namespace sovo::gige

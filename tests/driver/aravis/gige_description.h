@@ -2,7 +2,7 @@
 
 #include <string>
 
-namespace sovo {
+namespace sovo::gige {
 
 struct GigeSimulatorConfig;
 
@@ -48,4 +48,4 @@ constexpr unsigned kChunkIdImage = 0x1000;
 /// The simulator's GenICam description.
 std::string gige_description(const GigeSimulatorConfig& config);
 
-}  // namespace sovo
+}  // namespace sovo::gige

@@ -14,7 +14,7 @@
 #include "driver/aravis/gige_description.h"
 #include "sovo/driver/live/host_clock.h"
 
-namespace sovo {
+namespace sovo::gige {
 namespace {
 
 constexpr std::uint16_t kControlPort = 3956;
@@ -497,4 +497,4 @@ void GigeSimulator::serve_action(const Request& request) {
   answer(request, late ? 0x8016 : 0, {});
 }
 
-}  // namespace sovo
+}  // namespace sovo::gige

@@ -14,7 +14,7 @@
 #include <thread>
 #include <vector>
 
-namespace sovo {
+namespace sovo::gige {
 
 struct GigeSimulatorConfig {
   std::string address;  ///< Loopback address that it listens on.
@@ -141,4 +141,4 @@ class GigeSimulator {
   std::thread thread_;
 };
 
-}  // namespace sovo
+}  // namespace sovo::gige

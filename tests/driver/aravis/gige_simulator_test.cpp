@@ -7,11 +7,11 @@
 #include "driver/aravis/aravis_fixture.h"
 #include "sovo/driver/live/host_clock.h"
 
-namespace sovo {
+namespace sovo::gige {
 namespace {
 
-constexpr int kWidth = 160;
-constexpr int kHeight = 120;
+constexpr int kSimWidth = 160;
+constexpr int kSimHeight = 120;
 
 GigeSimulatorConfig simulated(const std::string& serial) {
   GigeSimulatorConfig config;
@@ -30,10 +30,10 @@ GigeSimulatorConfig without_ptp(const std::string& serial) {
 
 /// The instant that an image shows; it is whole.
 std::int64_t instant_shown(const SideImage& image) {
-  EXPECT_EQ(image.width, kWidth);
-  EXPECT_EQ(image.height, kHeight);
+  EXPECT_EQ(image.width, kSimWidth);
+  EXPECT_EQ(image.height, kSimHeight);
   const std::int64_t instant = instant_of(image.data->data());
-  std::vector<std::uint8_t> wanted(std::size_t{kWidth} * kHeight);
+  std::vector<std::uint8_t> wanted(std::size_t{kSimWidth} * kSimHeight);
   paint_instant(instant, &wanted);
   EXPECT_TRUE(std::equal(wanted.begin(), wanted.end(), image.data->begin()));
   return instant;
@@ -51,7 +51,7 @@ TEST_F(GigeSimulatorTest, ScheduledActionsExposeBothAtOneInstant) {
   GigeSimulator right(simulated("RIGHT"));
   ASSERT_TRUE(left.is_running() && right.is_running());
   options_.frame_rate = 10.0;
-  auto opened = open(kWidth, kHeight);
+  auto opened = open(kSimWidth, kSimHeight);
   ASSERT_TRUE(opened) << opened.error();
   LiveSource& source = *opened->source;
   const auto frames = take(&source, 12, [](const StereoFrame& frame) {
@@ -86,7 +86,7 @@ TEST_F(GigeSimulatorTest, LostPacketsAreSentAgain) {
   options_.packet_size = 576;
   live_.pair_tolerance_ms = 1000.0;  // each runs by itself
   left.lose_packets(0.03);
-  auto opened = open(kWidth, kHeight);
+  auto opened = open(kSimWidth, kSimHeight);
   ASSERT_TRUE(opened) << opened.error();
   const auto frames = take(opened->source.get(), 30);
   ASSERT_EQ(frames.size(), 30U);
@@ -113,7 +113,7 @@ TEST_F(GigeSimulatorTest, WithoutResendLossesAreCounted) {
   options_.packet_size = 576;
   options_.resend = false;
   left.lose_packets(0.01);
-  auto opened = open(kWidth, kHeight);
+  auto opened = open(kSimWidth, kSimHeight);
   ASSERT_TRUE(opened) << opened.error();
   const LiveReport report = report_when(opened->source.get(), [](const LiveReport& r) {
     return r.cameras[0].counts.damaged >= 3 && r.cameras[0].counts.images >= 3;
@@ -131,7 +131,7 @@ TEST_F(GigeSimulatorTest, ChunksBringTheExposureOfEachImage) {
   ASSERT_TRUE(left.is_running() && right.is_running());
   options_.sync = aravis::Sync::kFree;
   live_.pair_tolerance_ms = 1000.0;
-  auto opened = open(kWidth, kHeight);
+  auto opened = open(kSimWidth, kSimHeight);
   ASSERT_TRUE(opened) << opened.error();
   for (const StereoFrame& frame : take(opened->source.get(), 3)) {
     EXPECT_NEAR(frame.left.exposure_s, 3e-3, 1e-9);   // the image's own
@@ -148,7 +148,7 @@ TEST_F(GigeSimulatorTest, AnUnpluggedCameraReturnsWithItsFeatures) {
   options_.features = {"ExposureTime=4000"};
   options_.sync = aravis::Sync::kFree;
   live_.pair_tolerance_ms = 1000.0;
-  auto opened = open(kWidth, kHeight);
+  auto opened = open(kSimWidth, kSimHeight);
   ASSERT_TRUE(opened) << opened.error();
   LiveSource& source = *opened->source;
   ASSERT_EQ(take(&source, 3).size(), 3U);
@@ -181,7 +181,7 @@ TEST_F(GigeSimulatorTest, SoftwareTriggersGoToBothAtOnce) {
   GigeSimulator right(without_ptp("RIGHT"));
   ASSERT_TRUE(left.is_running() && right.is_running());
   options_.frame_rate = 5.0;
-  auto opened = open(kWidth, kHeight);
+  auto opened = open(kSimWidth, kSimHeight);
   ASSERT_TRUE(opened) << opened.error();
   const auto frames = take(opened->source.get(), 5);
   ASSERT_EQ(frames.size(), 5U);
@@ -200,7 +200,7 @@ TEST_F(GigeSimulatorTest, ATriggerLineIsPairedByTrackedClocks) {
   ASSERT_TRUE(left.is_running() && right.is_running());
   options_.trigger_source = "Line0";
   options_.frame_rate = 10.0;
-  auto opened = open(kWidth, kHeight);
+  auto opened = open(kSimWidth, kSimHeight);
   ASSERT_TRUE(opened) << opened.error();
   report_when(opened->source.get(), [&](const LiveReport&) {
     return left.counts().acquisitions > 0 && right.counts().acquisitions > 0;
@@ -227,7 +227,7 @@ TEST_F(GigeSimulatorTest, WhatACameraDoesNotTakeIsSaid) {
   ASSERT_TRUE(left.is_running() && right.is_running());
   const auto error_with = [this](const std::string& feature) {
     options_.features = {feature};
-    const auto opened = open(kWidth, kHeight);
+    const auto opened = open(kSimWidth, kSimHeight);
     return opened ? std::string("opened") : opened.error();
   };
   EXPECT_TRUE(contains(error_with("Gain=40"), "LEFT: Gain=40: the camera made it 10"));
@@ -235,16 +235,16 @@ TEST_F(GigeSimulatorTest, WhatACameraDoesNotTakeIsSaid) {
   EXPECT_TRUE(contains(error_with("TriggerMode=Perhaps"), "it may be: Off On"));
   EXPECT_TRUE(contains(error_with("Gain=loud"), "it must be a number"));
   options_.features.clear();
-  const auto large = open(2 * kWidth, kHeight);
+  const auto large = open(2 * kSimWidth, kSimHeight);
   ASSERT_FALSE(large);
   EXPECT_TRUE(contains(large.error(), "320x120")) << large.error();
   options_.pixel_format = "RGB8";
-  const auto colour = open(kWidth, kHeight);
+  const auto colour = open(kSimWidth, kSimHeight);
   ASSERT_FALSE(colour);
   EXPECT_TRUE(contains(colour.error(), "RGB8 cannot be read")) << colour.error();
   options_.pixel_format = "Mono8";
   options_.sync = aravis::Sync::kPtp;
-  const auto ptp = open(kWidth, kHeight);
+  const auto ptp = open(kSimWidth, kSimHeight);
   ASSERT_FALSE(ptp);
   EXPECT_TRUE(contains(ptp.error(), "cannot be synchronized by ptp")) << ptp.error();
 }
@@ -255,7 +255,7 @@ TEST_F(GigeSimulatorTest, ACameraThatIsNotThereIsWaitedFor) {
   ASSERT_TRUE(left.is_running() && right.is_running());
   right.unplug();
   options_.frame_rate = 5.0;
-  auto opened = open(kWidth, kHeight);
+  auto opened = open(kSimWidth, kSimHeight);
   ASSERT_TRUE(opened) << opened.error();
   ASSERT_EQ(opened->notes.size(), 1U);
   EXPECT_TRUE(contains(opened->notes[0], "no GigE Vision camera is 'RIGHT'"));
@@ -268,4 +268,4 @@ TEST_F(GigeSimulatorTest, ACameraThatIsNotThereIsWaitedFor) {
 }
 
 }  // namespace
-}  // namespace sovo
+}  // namespace sovo::gige

@@ -82,8 +82,8 @@ Result<void> check_options(const AravisOptions& options, const LiveOptions& live
   if (!(std::abs(options.stamp_offset_ms) <= 1000.0)) {
     return Error{"camera.aravis.stamp_offset_ms must be within a second"};
   }
-  if (!(live.stall_s > 0.0) || !(live.longest_wait_s > 0.0)) {
-    return Error{"camera.live.stall_s and longest_wait_s must be positive"};
+  if (!(live.stall_s >= 1.0) || !(live.longest_wait_s > 0.0)) {
+    return Error{"camera.live.stall_s must be at least 1, and longest_wait_s positive"};
   }
   if (auto features = parse_features(options.features); !features) return features.failure();
   return {};

@@ -1,5 +1,6 @@
 #include "sovo/driver/aravis/gige_capture.h"
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <mutex>
@@ -24,6 +25,30 @@ constexpr std::int64_t kLongestLeadNs = 50'000'000;
 Error named(const std::string& camera, const Error& error) {
   return Error{camera + ": " + error.message};
 }
+
+/// Where a camera's clock cannot be read, arrivals stand for it, and any of them may be late. The
+/// first images are held back until the promptest of a few is known: with a clock that is off by
+/// half a period they would be paired with their neighbours.
+class ArrivalClock {
+ public:
+  /// Whether an image that was stamped and arrived then shall be held back.
+  bool hold_back(std::int64_t device_ns, std::int64_t arrival_ns) {
+    if (images_ == 0) begin_ns_ = arrival_ns;
+    const std::int64_t delay = arrival_ns - device_ns;
+    least_ns_ = images_ == 0 ? delay : std::min(least_ns_, delay);
+    ++images_;
+    return images_ <= kImages && arrival_ns - begin_ns_ < kLongestNs;
+  }
+  /// When an image stamped so would have arrived promptly.
+  std::int64_t prompt(std::int64_t device_ns) const { return device_ns + least_ns_; }
+
+ private:
+  static constexpr int kImages = 15;
+  static constexpr std::int64_t kLongestNs = 500'000'000;
+  int images_ = 0;
+  std::int64_t begin_ns_ = 0;
+  std::int64_t least_ns_ = 0;
+};
 
 /// A stream of libaravis as a capture device.
 class GigeCapture : public CaptureDevice {
@@ -55,6 +80,7 @@ class GigeCapture : public CaptureDevice {
   CaptureState gone(Capture* capture, const std::string& why);
   CaptureState read(ArvBuffer* buffer, Capture* capture);
   void fill_times(ArvBuffer* buffer, Capture* capture) const;
+  bool is_held_back(Capture* capture);
   void ask_camera(SteadyClock::time_point now);
 
   Owned<ArvCamera> camera_;
@@ -69,6 +95,7 @@ class GigeCapture : public CaptureDevice {
   std::atomic<bool> lost_{false};
   bool unreachable_ = false;
   FrameGaps gaps_;
+  std::optional<ArrivalClock> arrivals_{ArrivalClock()};  ///< Until images are handed on.
   GreyReader grey_;
   SteadyClock::time_point last_sign_ = SteadyClock::now();
   SteadyClock::time_point last_asked_{};
@@ -168,8 +195,9 @@ CaptureState GigeCapture::next(std::chrono::milliseconds timeout, Capture* captu
   const auto now = SteadyClock::now();
   if (buffer == nullptr) return check_silence(now, capture);
   last_sign_ = now;
-  const CaptureState state = read(buffer, capture);
+  CaptureState state = read(buffer, capture);
   arv_stream_push_buffer(stream_.get(), buffer);
+  if (state == CaptureState::kImage && is_held_back(capture)) state = CaptureState::kNone;
   // Now, with the next trigger still some time away.
   ask_camera(now);
   return state;
@@ -252,6 +280,16 @@ void GigeCapture::fill_times(ArvBuffer* buffer, Capture* capture) const {
     capture->clock_device_ns = start;
     capture->clock_utc_ns = static_cast<std::int64_t>(arv_buffer_get_system_timestamp(buffer));
   }
+}
+
+bool GigeCapture::is_held_back(Capture* capture) {
+  if (!arrivals_) return false;
+  if (!control_->state().clock) {
+    if (arrivals_->hold_back(capture->clock_device_ns, capture->clock_utc_ns)) return true;
+    capture->clock_utc_ns = arrivals_->prompt(capture->clock_device_ns);
+  }
+  arrivals_.reset();
+  return false;
 }
 
 Result<void> GigeCapture::set_exposure(const Exposure& exposure) {

@@ -6,6 +6,7 @@
 
 #include "sovo/bridge/dds_config.h"
 #include "sovo/bridge/recorder_config.h"
+#include "sovo/driver/aravis/aravis_options.h"
 #include "sovo/driver/live/live_options.h"
 #include "sovo/driver/sim/sim_config.h"
 #include "sovo/driver/v4l2/v4l2_options.h"
@@ -50,6 +51,7 @@ struct CameraSection {
   double frame_rate = 20.0;
   LiveOptions live;
   v4l2::V4l2Options v4l2;
+  aravis::AravisOptions aravis;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -65,6 +67,7 @@ struct CameraSection {
     v("frame_rate", frame_rate, "of images that have no stamps [Hz]");
     v("live", live, "real cameras of all kinds");
     v("v4l2", v4l2, "cameras on USB and others that the kernel knows");
+    v("aravis", aravis, "two GigE Vision cameras");
   }
 };
 

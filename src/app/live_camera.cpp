@@ -6,6 +6,8 @@
 #include "sovo/app/config_options.h"
 #include "sovo/app/failure.h"
 #include "sovo/app/live_publication.h"
+#include "sovo/driver/aravis/aravis_source.h"
+#include "sovo/driver/aravis/gige_network.h"
 #include "sovo/driver/v4l2/controls.h"
 #include "sovo/driver/v4l2/device_list.h"
 #include "sovo/driver/v4l2/modes.h"
@@ -70,6 +72,58 @@ void add_v4l2_command(const Command& camera) {
   });
 }
 
+Result<LiveInput> open_aravis_input(const CameraSection& camera) {
+  auto opened = aravis::open_aravis(camera.aravis, camera.live, camera.calibration);
+  if (!opened) return opened.failure();
+  return LiveInput{std::move(opened->source), std::move(opened->calibration),
+                   std::move(opened->notes)};
+}
+
+void add_aravis_command(const Command& camera) {
+  const Command command = camera.add_command("aravis", "Publish two GigE Vision cameras");
+  auto options = std::make_shared<ConfigOptions>(command);
+  options->value("--left", "camera.aravis.left", "Left camera: serial number or address", "SERIAL")
+      .value("--right", "camera.aravis.right", "Right camera", "SERIAL")
+      .value("--rate", "camera.aravis.frame_rate", "Images a second", "HZ")
+      .value("--format", "camera.aravis.pixel_format", "Pixel format, e.g. Mono8", "NAME")
+      .value("--sync", "camera.aravis.sync", "What makes both expose at one instant",
+             "auto|hardware|action|ptp|software|free")
+      .value("--trigger-source", "camera.aravis.trigger_source", "Wired line of sync hardware",
+             "LINE")
+      .list("--feature", "camera.aravis.features", "GenICam feature; may be repeated", "NAME=VALUE")
+      .flag("--auto-exposure", "camera.live.auto_exposure.enabled",
+            "Exposure control of our own: slow, the same on both sides")
+      .value("--calib", "camera.calibration", "Calibration file", "FILE")
+      .value("--frames", "camera.frames", "End after so many frames", "N")
+      .value("--name", "camera.name", "Prefix of the camera's frame names", "NAME");
+  add_dds_options(*options);
+  command.action([options] {
+    const auto config = options->load();
+    if (!config) return fail(kUsage, config.error());
+    if (auto sane = aravis::check_options(config->camera.aravis, config->camera.live); !sane) {
+      return fail(kUsage, sane.error());
+    }
+    return publish_live(*config, [&config] { return open_aravis_input(config->camera); });
+  });
+}
+
+void list_network_cameras() {
+  aravis::GigeNetwork network;
+  const auto cameras = network.cameras();
+  if (cameras.empty()) std::cout << "no GigE Vision camera answers\n";
+  for (const aravis::GigeInfo& info : cameras) {
+    const aravis::InterfaceInfo interface = aravis::find_interface(info.address);
+    std::cout << info.address << ": " << info.name << ", serial " << info.serial;
+    if (interface.name.empty()) {
+      std::cout << "\n  not in the subnet of any port of this machine: it cannot stream\n";
+      continue;
+    }
+    std::cout << ", at " << interface.name << " (MTU " << interface.mtu;
+    if (interface.speed_mbps > 0) std::cout << ", " << interface.speed_mbps << " Mbit/s";
+    std::cout << ")\n";
+  }
+}
+
 void print_modes(const v4l2::DeviceFile& file) {
   for (const v4l2::Mode& mode : v4l2::list_modes(file)) {
     std::cout << "  mode " << mode.width << "x" << mode.height << " " << mode.format;
@@ -115,6 +169,7 @@ int list_cameras() {
     print_modes(*file);
     print_controls(*file);
   }
+  list_network_cameras();
   return kOk;
 }
 
@@ -122,6 +177,7 @@ int list_cameras() {
 
 void add_live_camera_commands(const Command& camera) {
   add_v4l2_command(camera);
+  add_aravis_command(camera);
   camera.add_command("list", "What is attached: devices, modes, controls, serial numbers")
       .action(list_cameras);
 }

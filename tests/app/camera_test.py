@@ -1,5 +1,5 @@
-"""`sovo camera v4l2`, `sovo camera list` and `sovo doctor` where no camera is attached; real drivers
-are in tests/vm."""
+"""`sovo camera v4l2` and `aravis`, `sovo camera list` and `sovo doctor` where no camera is attached;
+real drivers are in tests/vm, simulated GigE Vision cameras in tests/driver/aravis."""
 
 import os
 import signal
@@ -25,6 +25,19 @@ class RealCameras(CommandTest):
                               (["--set", "camera.v4l2.buffers=2"], "4 to 32")):
             result = self.expect(sovo("camera", "v4l2", *options), USAGE)
             self.assertIn(part, result.stderr, options)
+
+    def test_wrong_options_of_network_cameras_say_what_is_wrong(self):
+        both = ["--left", "1", "--right", "2"]
+        for options, part in ((["--left", "1"], "give both cameras"),
+                              (["--left", "1", "--right", "1"], "the same camera"),
+                              ([*both, "--feature", "Gain"], "Name=value"),
+                              ([*both, "--sync", "magic"], "auto"),
+                              ([*both, "--set", "camera.aravis.buffers=2"], "4 to 64"),
+                              ([*both, "--set", "camera.aravis.packet_size=9"], "576 to 65535")):
+            result = self.expect(sovo("camera", "aravis", *options), USAGE)
+            self.assertIn(part, result.stderr, options)
+        result = self.expect(sovo("camera", "aravis", *both), BAD_INPUT)
+        self.assertIn("--calib FILE", result.stderr)
 
     def test_without_a_calibration_it_says_where_one_is(self):
         result = self.expect(sovo("camera", "v4l2", "--device", "not-there"), BAD_INPUT)

@@ -11,6 +11,7 @@ namespace {
 constexpr std::chrono::milliseconds kSlice(100);
 constexpr std::chrono::seconds kRateWindow(2);
 constexpr std::chrono::seconds kAskEvery(1);
+constexpr std::uint8_t kPtpClock = 2;  // of StereoFrame::clock
 
 double seconds(std::chrono::steady_clock::duration d) {
   return std::chrono::duration<double>(d).count();
@@ -172,16 +173,17 @@ void CameraWorker::found() {
 void CameraWorker::handle_image(Capture* capture) {
   const std::uint64_t steps = clock_.steps();
   clock_.observe(capture->clock_device_ns, capture->clock_utc_ns);
-  if (clock_.steps() != steps) clock_set_();
+  if (clock_.steps() != steps || capture->shared_clock != ptp_) clock_set_();
+  ptp_ = capture->shared_clock;
   const auto now = Clock::now();
   last_image_ = now;
   next_sequence_ += capture->skipped;
   TimedImage image;
   image.stamp_ns = clock_.to_utc(capture->device_ns);
-  image.time_ns = config_.shared_clock ? capture->device_ns : image.stamp_ns;
+  image.time_ns = config_.shared_clock || ptp_ ? capture->device_ns : image.stamp_ns;
   image.stamp_sigma_s = clock_.sigma_s();
   image.sequence = next_sequence_++;
-  image.clock = config_.clock_kind;
+  image.clock = ptp_ ? kPtpClock : config_.clock_kind;
   image.image = std::move(capture->image);
   {
     const std::scoped_lock lock(mutex_);

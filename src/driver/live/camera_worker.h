@@ -70,6 +70,7 @@ class CameraWorker {
 
   // The worker's own.
   DeviceClock clock_;
+  bool ptp_ = false;  ///< Device stamps are of a clock that both cameras share.
   Backoff backoff_;
   std::uint64_t next_sequence_ = 0;
   std::optional<Clock::time_point> last_image_;

@@ -27,6 +27,7 @@ struct Capture {
   std::int64_t device_ns = 0;        ///< Mid-exposure by the device's clock.
   std::int64_t clock_device_ns = 0;  ///< A reading of the device's clock and of UTC, the latter
   std::int64_t clock_utc_ns = 0;     ///< the same moment or later.
+  bool shared_clock = false;         ///< The device's clock is one with the other's, by PTP.
   std::uint64_t skipped = 0;         ///< Images that the device made and lost since the last one.
   SideImage image;
   SideImage right;      ///< Of a device that gives both sides at once; else not valid.

@@ -118,8 +118,9 @@ class LossyNetwork(TwoHosts):
         self.assertGreater(received, FRAMES // 2, log)
         listener.send_signal(signal.SIGINT)
         thread.join(60)
-        self.assertEqual(heard, sorted(set(heard)))
-        self.assertGreater(len(heard), received - 5)
+        self.assertGreater(len(heard), received // 2)
+        self.assertEqual(heard, list(range(heard[0], heard[0] + len(heard))), "a gap was not filled")
+        self.assertGreaterEqual(heard[-1], FRAMES - 2)
 
 
 if __name__ == "__main__":

@@ -126,11 +126,11 @@ TEST_F(RecordingTest, EveryFileBeginsWithWhatLateReadersNeed) {
   for (std::size_t i = 1; i < files; ++i) {
     auto alone = Recording::open((*recording)->files()[i]->path());
     ASSERT_TRUE(alone.ok()) << alone.error();
-    for (const std::uint8_t value : {2, 3}) {
+    for (const int value : {2, 3}) {
       const auto message = (*alone)->next();
       ASSERT_TRUE(message.has_value());
       EXPECT_EQ(message->topic->topic, "/map");
-      EXPECT_EQ(message->data.front(), value);
+      EXPECT_EQ(int{message->data.front()}, value);
       EXPECT_EQ(message->publish_ns, 10U);
     }
   }

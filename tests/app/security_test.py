@@ -1,6 +1,7 @@
 """DDS Security: who has no key neither reads nor writes."""
 
 import os
+import pathlib
 import re
 import signal
 import subprocess
@@ -90,6 +91,14 @@ class SharedMemory(BusTest):
         recorder = self.start("record", "-o", dive, "--min-free", "1MB", *self.SHM)
         self.wait_for_line(recorder.stderr, "recording to")
         vo = self.start("vo", "--frames", FRAMES, *self.SHM)
+        self.wait_for_line(vo.stderr, "through shared memory")
+
+        def uses_it(process):
+            maps = pathlib.Path(f"/proc/{process.pid}/maps").read_text()
+            return "/dev/shm/iceoryx_mgmt" in maps
+
+        self.assertTrue(uses_it(vo))
+        self.assertFalse(uses_it(recorder))
         camera = self.camera("--rate", "max", *self.SHM)
         self.assertIn("through shared memory", self.expect(camera, OK).stderr)
         _, log = self.finish(vo)

@@ -16,11 +16,14 @@ add_compile_options(-ffp-contract=off -fno-math-errno)
 
 # Null and misaligned pointers and what lies outside an object stop the program or the address
 # sanitizer anyway; the other checks of these take the compiler more time than all the rest.
+option(SOVO_SANITIZE_POINTERS "Let the undefined-behaviour sanitizer check every pointer too" OFF)
 if(SOVO_SANITIZE)
   add_compile_options(-fsanitize=${SOVO_SANITIZE} -fno-omit-frame-pointer)
   if(SOVO_SANITIZE MATCHES undefined)
-    add_compile_options(-fno-sanitize=null,alignment,object-size,vptr
-      -fno-sanitize-recover=undefined)
+    add_compile_options(-fno-sanitize-recover=undefined)
+    if(NOT SOVO_SANITIZE_POINTERS)
+      add_compile_options(-fno-sanitize=null,alignment,object-size,vptr)
+    endif()
   endif()
   add_link_options(-fsanitize=${SOVO_SANITIZE})
 endif()

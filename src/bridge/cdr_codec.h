@@ -10,20 +10,12 @@
 
 #include "message_traits.h"
 #include "sovo/bridge/cdr_sertype.h"
+#include "sovo/bridge/message_kinds.h"
 #include "sovo/io/result.h"
 
 namespace sovo::bridge {
 
 namespace cdr_detail {
-
-template <class T>
-concept Message = requires {
-  MessageTraits<T>::kRosName;
-};
-template <class T>
-concept Sequence = requires(T t) {
-  t._buffer;
-};
 
 /// Reads XCDR1. What goes wrong makes everything after it read as nothing.
 class Decoder {
@@ -32,9 +24,9 @@ class Decoder {
 
   template <class T>
   void read(T& value) {
-    if constexpr (Message<T>) {
+    if constexpr (IsMessage<T>) {
       MessageTraits<T>::visit(value, [this](const char*, auto& field) { read(field); });
-    } else if constexpr (Sequence<T>) {
+    } else if constexpr (IsSequence<T>) {
       read_sequence(value);
     } else if constexpr (std::is_array_v<T>) {
       for (auto& element : value) read(element);
@@ -92,9 +84,9 @@ class Encoder {
 
   template <class T>
   void write(const T& value) {
-    if constexpr (Message<T>) {
+    if constexpr (IsMessage<T>) {
       MessageTraits<T>::visit(value, [this](const char*, const auto& field) { write(field); });
-    } else if constexpr (Sequence<T>) {
+    } else if constexpr (IsSequence<T>) {
       write(sequence_length(value));
       write_elements(value._buffer, value._length);
     } else if constexpr (std::is_array_v<T>) {

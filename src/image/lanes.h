@@ -66,22 +66,18 @@ inline Lane sum_lanes(Lane a, Lane b, Lane c, Lane d) {
   return (a + b) + (c + d);
 }
 
-/// `sample` of interpolation.h at four positions at once, bit for bit the same. All four must
-/// satisfy its precondition.
-inline Lane sample_lanes(const ImageF& image, Lane x, Lane y) {
-  const LaneMask ix = __builtin_convertvector(x, LaneMask);
-  const LaneMask iy = __builtin_convertvector(y, LaneMask);
-  const Lane fx = x - __builtin_convertvector(ix, Lane);
-  const Lane fy = y - __builtin_convertvector(iy, Lane);
-  const std::ptrdiff_t w = image.width();
+/// Bilinear interpolation of four 2x2 pixels: the upper left ones by their offset in an image of
+/// `width`, and the positions within.
+inline Lane blend_lanes(const float* image, std::ptrdiff_t width, LaneMask offset, Lane fx,
+                        Lane fy) {
   // Two neighbours in a row are loaded as one double.
   using Pairs = double __attribute__((vector_size(16)));
   Pairs upper[2];
   Pairs lower[2];
   for (std::size_t i = 0; i < kLanes; ++i) {
-    const float* pixel = image.data() + iy[i] * w + ix[i];
+    const float* pixel = image + offset[i];
     __builtin_memcpy(reinterpret_cast<char*>(&upper[i / 2]) + 8 * (i % 2), pixel, 8);
-    __builtin_memcpy(reinterpret_cast<char*>(&lower[i / 2]) + 8 * (i % 2), pixel + w, 8);
+    __builtin_memcpy(reinterpret_cast<char*>(&lower[i / 2]) + 8 * (i % 2), pixel + width, 8);
   }
   const auto u0 = reinterpret_cast<Lane>(upper[0]);
   const auto u1 = reinterpret_cast<Lane>(upper[1]);
@@ -94,6 +90,16 @@ inline Lane sample_lanes(const ImageF& image, Lane x, Lane y) {
   const Lane top = upper_left + fx * (upper_right - upper_left);
   const Lane bottom = lower_left + fx * (lower_right - lower_left);
   return top + fy * (bottom - top);
+}
+
+/// `sample` of interpolation.h at four positions at once, bit for bit the same. All four must
+/// satisfy its precondition.
+inline Lane sample_lanes(const ImageF& image, Lane x, Lane y) {
+  const LaneMask ix = __builtin_convertvector(x, LaneMask);
+  const LaneMask iy = __builtin_convertvector(y, LaneMask);
+  const LaneMask offset = iy * image.width() + ix;
+  return blend_lanes(image.data(), image.width(), offset, x - __builtin_convertvector(ix, Lane),
+                     y - __builtin_convertvector(iy, Lane));
 }
 
 /// Values and gradients of an image at four positions [grey levels, grey levels / px].

@@ -17,7 +17,7 @@ using Mat2f = Eigen::Matrix2f;
 
 constexpr int kHalfAlong = kPatchAlong / 2;
 constexpr int kHalfAcross = kPatchAcross / 2;
-constexpr int kNodeSteps = 4;      ///< Steps between exact projections.
+constexpr int kNodeSteps = 8;      ///< Steps between exact projections; whole lanes.
 constexpr int kSegmentSteps = 24;  ///< Steps that share one warp of the base patch; whole lanes.
 constexpr double kMinSpeed = 1e-6;
 constexpr double kMaxShear = 0.6;       ///< Displacement along the curve a row across [px].
@@ -119,9 +119,9 @@ struct Strip {
   std::array<float, kStride> sum, energy, rho;
   std::array<std::int32_t, kStride> seen;  ///< -1 or 0.
 };
-static_assert(kNodeSteps == kLanes);
+static_assert(kNodeSteps % kLanes == 0);
 
-/// Appends the first `count` of four columns from `from` on, in steps of `step`.
+/// Appends the first `count` of four columns from `from` on, in steps of `step`; at most all.
 void append_columns(const ImageF& image, const Vec2f& from, const Vec2f& step, const Vec2f& across,
                     int count, Strip* strip) {
   const auto k = static_cast<std::size_t>(strip->size);
@@ -189,7 +189,10 @@ void sample_strip(const PatchSearch& search, int level, double rho_min, double r
       strip->rho[static_cast<std::size_t>(strip->size + count)] = static_cast<float>(at);
       if (at > rho_max) ++after;
     }
-    append_columns(image, from, step, across, count, strip);
+    for (int i = 0; i < count; i += static_cast<int>(kLanes)) {
+      append_columns(image, from + static_cast<float>(i) * step, step, across,
+                     std::min(static_cast<int>(kLanes), count - i), strip);
+    }
     const bool inside = strip->seen[static_cast<std::size_t>(strip->size - 1)] != 0;
     if (entered && !inside) return;
     entered = entered || inside;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <optional>
 
 #include "sovo/geometry/types.h"
@@ -51,11 +52,12 @@ bool correlate(const PatchSearch& search, int level, double rho_min, double rho_
 struct Alignment {
   double rho = 0.0;
   double zncc = 0.0;
-  double sigma_px = 0.0;         ///< Standard deviation along the curve [px].
-  double px_per_rho = 0.0;       ///< Speed along the curve [px m].
-  double across_px = 0.0;        ///< Displacement that fits best across the curve [px].
-  double across_sigma_px = 0.0;  ///< Its standard deviation; infinite when not observable.
-  Vec2 pixel = Vec2::Zero();     ///< In the target image, level 0.
+  double sigma_px = 0.0;    ///< Standard deviation along the curve [px].
+  double px_per_rho = 0.0;  ///< Speed along the curve [px m].
+  double across_px = 0.0;   ///< Displacement that fits best across the curve [px].
+  /// Its standard deviation; infinite when not observable, or not measured.
+  double across_sigma_px = std::numeric_limits<double>::infinity();
+  Vec2 pixel = Vec2::Zero();  ///< In the target image, level 0.
 };
 
 /// Rms gradient along the curve of the base patch at level 0 [grey levels / px]; nothing when the

@@ -161,6 +161,20 @@ std::optional<Found> search_range(const PatchSearch& search, const VisibleRange&
   return Found{*winner, level};
 }
 
+/// Whether nothing in the range correlates better than what is near `expected`.
+bool is_best_of_range(const PatchSearch& search, const Range& range, double expected, int level,
+                      CorrelationProfile* profile) {
+  const auto visible = clip_to_image(search.curve, range);
+  const auto point = search.curve.at(expected);
+  if (!visible || !point) return false;
+  if (!correlate(search, level, visible->range.min, visible->range.max, profile)) return true;
+  const int best = profile->best();
+  if (best < 0) return false;
+  const double off = std::abs(static_cast<double>(profile->rho[best]) - expected) *
+                     point->derivative.norm() / (1 << level);
+  return off <= kModeDistance;
+}
+
 /// Whether the right pixel, looked for in the left image over the same range, leads back.
 bool leads_back(const PatchSearch& forward, const StereoRig& rig, const Range& range, double rho,
                 const Vec2& right_pixel, int level, double max_error_px,
@@ -170,16 +184,9 @@ bool leads_back(const PatchSearch& forward, const StereoRig& rig, const Range& r
   const Range back{inverse_distance(search->curve, range.min),
                    inverse_distance(search->curve, range.max)};
   const double expected = inverse_distance(search->curve, rho);
-  const auto visible = clip_to_image(search->curve, back);
   const auto point = search->curve.at(expected);
-  if (!visible || !point) return false;
-  if (correlate(*search, level, visible->range.min, visible->range.max, profile)) {
-    const int best = profile->best();
-    if (best < 0) return false;
-    const double off = std::abs(static_cast<double>(profile->rho[best]) - expected) *
-                       point->derivative.norm() / (1 << level);
-    if (off > kModeDistance) return false;
-  }
+  if (!point) return false;
+  if (!is_best_of_range(*search, back, expected, level, profile)) return false;
   const double reach = 3.0 / point->derivative.norm();
   if (!correlate(*search, 0, expected - reach, expected + reach, profile)) return false;
   const int best = profile->best();
@@ -208,14 +215,13 @@ StaticMatcher::StaticMatcher(const StaticMatcherConfig& config, const StereoRig&
 }
 
 StaticMatch StaticMatcher::match(const ImagePyramid& left, const ImagePyramid& right, float u,
-                                 float v,
-                                 std::optional<std::pair<float, float>> inverse_depth_range) const {
+                                 float v, const MatchRequest& request) const {
   StaticMatch out;
   const PatchSearch search = forward_search(rig_, left, right, Vec2(u, v));
-  Range range = inverse_depth_range ? Range{static_cast<double>(inverse_depth_range->first),
-                                            static_cast<double>(inverse_depth_range->second)}
-                                    : Range{config_.max_depth > 0.0 ? 1.0 / config_.max_depth : 0.0,
-                                            1.0 / config_.min_depth};
+  const auto& known = request.inverse_depth_range;
+  Range range = known ? Range{static_cast<double>(known->first), static_cast<double>(known->second)}
+                      : Range{config_.max_depth > 0.0 ? 1.0 / config_.max_depth : 0.0,
+                              1.0 / config_.min_depth};
   const bool clamp = range.min >= 0.0;
   const auto farthest = search.curve.at(range.min);
   if (!farthest) return out;
@@ -236,7 +242,7 @@ StaticMatch StaticMatcher::match(const ImagePyramid& left, const ImagePyramid& r
 
   out.state = MatchState::kLowCorrelation;
   out.zncc = static_cast<float>(found->mode.score);
-  const auto aligned = align(search, found->mode.rho, true);
+  const auto aligned = align(search, found->mode.rho, request.across);
   if (!aligned) return out;
   fill(*aligned, search.curve, clamp, &out);
   if (aligned->zncc < config_.min_zncc) return out;

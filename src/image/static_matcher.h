@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <utility>
 
@@ -48,8 +49,15 @@ struct StaticMatch {
   float disparity_px = 0.0F;  ///< From the image of the point at infinity; negative behind it.
   float zncc = 0.0F;
   float across_px = 0.0F;  ///< Residual displacement across the curve (decalibration).
-  /// Standard deviation of `across_px`; infinite where the texture cannot tell.
-  float across_sigma_px = 0.0F;
+  /// Standard deviation of `across_px`; infinite where the texture cannot tell, or nobody asked.
+  float across_sigma_px = std::numeric_limits<float>::infinity();
+};
+
+struct MatchRequest {
+  /// [min, max] where something is known; a negative range looks behind infinity, where matches
+  /// mean swapped cameras [1/m].
+  std::optional<std::pair<float, float>> inverse_depth_range = {};
+  bool across = false;  ///< Whether the displacement across the curve is wanted, at twice the cost.
 };
 
 /// Matches left pixels in the simultaneous right image along the epipolar curve, by correlation,
@@ -58,11 +66,9 @@ class StaticMatcher {
  public:
   StaticMatcher(const StaticMatcherConfig& config, const StereoRig& rig);
 
-  /// Matches one left pixel (level 0, sub-pixel). `inverse_depth_range` [min, max] narrows the
-  /// search where something is known; a negative range looks behind infinity, where matches mean
-  /// swapped cameras. Thread-safe.
+  /// Matches one left pixel (level 0, sub-pixel). Thread-safe.
   StaticMatch match(const ImagePyramid& left, const ImagePyramid& right, float u, float v,
-                    std::optional<std::pair<float, float>> inverse_depth_range = {}) const;
+                    const MatchRequest& request = {}) const;
 
  private:
   StaticMatcherConfig config_;

@@ -4,6 +4,8 @@
 #include <cassert>
 #include <cmath>
 
+#include "sovo/image/lanes.h"
+
 namespace sovo {
 
 namespace {
@@ -102,22 +104,26 @@ Undistorter::Undistorter(const CameraModel& raw, const CameraModel& pinhole)
       raw_width_(raw.width),
       raw_height_(raw.height) {
   assert(pinhole.distortion == Distortion::kNone && raw.width >= 2 && raw.height >= 2);
+  assert(pinhole.width * pinhole.height >= static_cast<int>(kLanes));
   identity_ = raw.distortion == Distortion::kNone && raw.width == pinhole.width &&
               raw.height == pinhole.height && raw.fx == pinhole.fx && raw.fy == pinhole.fy &&
               raw.cx == pinhole.cx && raw.cy == pinhole.cy;
   if (identity_) return;
-  taps_.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  const std::size_t size = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
+  offset_.assign(size, -1);
+  fx_.assign(size, 0.0F);
+  fy_.assign(size, 0.0F);
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
-      Tap& tap = taps_[static_cast<std::size_t>(y) * width_ + x];
+      const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + x;
       const Vec3 ray((x - pinhole.cx) / pinhole.fx, (y - pinhole.cy) / pinhole.fy, 1.0);
       const auto source = raw.project(ray);
       if (!source || !raw.contains(*source)) continue;
       const int ix = std::min(static_cast<int>(source->x()), raw.width - 2);
       const int iy = std::min(static_cast<int>(source->y()), raw.height - 2);
-      tap.offset = iy * raw.width + ix;
-      tap.fx = static_cast<float>(source->x() - ix);
-      tap.fy = static_cast<float>(source->y() - iy);
+      offset_[i] = iy * raw.width + ix;
+      fx_[i] = static_cast<float>(source->x() - ix);
+      fy_[i] = static_cast<float>(source->y() - iy);
     }
   }
 }
@@ -129,28 +135,26 @@ void Undistorter::apply(const ImageF& raw, ImageF* out) const {
     std::copy_n(raw.data(), raw.size(), out->data());
     return;
   }
-  const float* in = raw.data();
-  const Tap* tap = taps_.data();
-  float* value = out->data();
-  for (std::size_t i = 0; i < out->size(); ++i) {
-    if (tap[i].offset < 0) {
-      value[i] = 0.0F;
-      continue;
-    }
-    const float* upper = in + tap[i].offset;
-    const float* lower = upper + raw_width_;
-    const float top = upper[0] + tap[i].fx * (upper[1] - upper[0]);
-    const float bottom = lower[0] + tap[i].fx * (lower[1] - lower[0]);
-    value[i] = top + tap[i].fy * (bottom - top);
+  const std::size_t size = out->size();
+  const LaneMask none{};
+  for (std::size_t i = 0; i < size; i += kLanes) {
+    // The last pixels are computed with some of those before them.
+    i = std::min(i, size - kLanes);
+    LaneMask offset;
+    __builtin_memcpy(&offset, &offset_[i], sizeof(offset));
+    const LaneMask readable = offset < 0 ? none : offset;
+    const Lane value =
+        blend_lanes(raw.data(), raw_width_, readable, load_lane(&fx_[i]), load_lane(&fy_[i]));
+    store_lane(offset < 0 ? Lane{} : value, out->data() + i);
   }
 }
 
 Vec2 Undistorter::source(int x, int y) const {
   if (identity_) return {x, y};
-  const Tap& tap = taps_[static_cast<std::size_t>(y) * width_ + x];
-  if (tap.offset < 0) return {-1.0, -1.0};
-  return {tap.offset % raw_width_ + static_cast<double>(tap.fx),
-          tap.offset / raw_width_ + static_cast<double>(tap.fy)};
+  const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + x;
+  if (offset_[i] < 0) return {-1.0, -1.0};
+  return {offset_[i] % raw_width_ + static_cast<double>(fx_[i]),
+          offset_[i] / raw_width_ + static_cast<double>(fy_[i])};
 }
 
 ImageU8 Undistorter::valid_mask(const ImageU8& raw_mask) const {

@@ -39,18 +39,15 @@ class Undistorter {
   Vec2 source(int x, int y) const;
 
  private:
-  /// Bilinear interpolation from the raw pixels offset, offset + 1 and the two below them.
-  struct Tap {
-    int offset = -1;  ///< Negative where there is no source.
-    float fx = 0.0F, fy = 0.0F;
-  };
-
   int width_ = 0;
   int height_ = 0;
   int raw_width_ = 0;
   int raw_height_ = 0;
   bool identity_ = false;
-  AlignedVector<Tap> taps_;
+  /// Bilinear interpolation from the raw pixels offset, offset + 1 and the two below them; the
+  /// offset is negative where there is no source.
+  AlignedVector<std::int32_t> offset_;
+  AlignedVector<float> fx_, fy_;  ///< Position between them.
 };
 
 }  // namespace sovo

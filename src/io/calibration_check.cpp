@@ -89,7 +89,7 @@ void match_pair(const StereoRig& rig, const ImageF& base, const ImageF& target, 
   const ImagePyramid right = pyramid_of(target);
   for (const auto& [x, y] : points) {
     const StaticMatch match =
-        matcher.match(left, right, static_cast<float>(x), static_cast<float>(y));
+        matcher.match(left, right, static_cast<float>(x), static_cast<float>(y), {.across = true});
     if (match.state == MatchState::kOutOfView || match.state == MatchState::kNoTexture) continue;
     ++out->points;
     if (match.state != MatchState::kMatched) continue;

@@ -37,7 +37,7 @@ void ScaleFilter::reset() {
 void ScaleFilter::lock_initial(double sigma, std::int64_t stamp_ns) {
   locked_ = true;
   searching_ = false;
-  disagreements_ = 0;
+  agree_again();
   candidate_.reset();
   variance_ = square(std::max(sigma, config_.initial_sigma));
   path_variance_ = variance_;
@@ -50,6 +50,7 @@ ScaleUpdate ScaleFilter::update(const ScaleMeasurement& m) {
     path_variance_ += walked(m);
   }
   if (candidate_) candidate_->variance += walked(m);
+  if (rejected_) rejected_->variance += walked(m);
   ScaleUpdate update;
   if (is_miss(m.estimate.verdict)) {
     update.verdict = m.estimate.verdict;
@@ -77,7 +78,7 @@ ScaleUpdate ScaleFilter::update_tracking(const ScaleMeasurement& m) {
   learn(update.innovation, innovation_variance);
   if (!within_gate(update)) {
     update.verdict = ScaleVerdict::kInnovation;
-    disagree();
+    disagree_with(update, measured_variance(m));
     return update;
   }
   return correct(m, update);
@@ -118,7 +119,7 @@ ScaleUpdate ScaleFilter::correct(const ScaleMeasurement& m, ScaleUpdate update) 
   variance_ = square(1.0 - K) * variance_ + square(K) * R * correlation_growth(c * (1.0 - K));
   // Spectrum of the error at frequency zero: noise passes entire, the walk as it lags.
   path_variance_ = R * correlation_growth(c) + square((1.0 - K) / K) * walked(m);
-  disagreements_ = 0;
+  agree_again();
   searching_ = false;
   accepted_stamp_ns_ = m.stamp_ns;
   return update;
@@ -138,7 +139,27 @@ ScaleUpdate ScaleFilter::lock_on(const ScaleMeasurement& m, ScaleUpdate update, 
 
 void ScaleFilter::disagree() {
   ++disagreements_;
+  agreeing_ = 0;
+  rejected_.reset();
   if (disagreements_ >= config_.cold_start_after) searching_ = true;
+}
+
+/// Noise disagrees in all directions; a scale that is wrong, always in one.
+void ScaleFilter::disagree_with(const ScaleUpdate& update, double variance) {
+  const bool agrees =
+      rejected_ && square(update.innovation - rejected_->log_scale) <=
+                       square(config_.gate_sigmas) * (rejected_->variance + variance);
+  const int agreeing = agrees ? agreeing_ + 1 : 1;
+  disagree();
+  agreeing_ = agreeing;
+  rejected_ = Candidate{update.innovation, variance};
+  if (agreeing_ >= config_.cold_start_after_agreeing) searching_ = true;
+}
+
+void ScaleFilter::agree_again() {
+  disagreements_ = 0;
+  agreeing_ = 0;
+  rejected_.reset();
 }
 
 /// Innovations of a filter that knows its noises are white and as large as it expects. Their size

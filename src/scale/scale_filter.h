@@ -19,12 +19,13 @@ struct ScaleFilterConfig {
   double measurement_factor = 4.0;
   double min_measurement_factor = 1.0;  ///< Bounds of what is learned.
   double max_measurement_factor = 30.0;
-  double min_distance = 0.02;     ///< Distance counted at least, a keyframe [median depths].
-  double learning_rate = 0.05;    ///< Of both noises from innovations; 0 holds them.
-  double gate_sigmas = 3.0;       ///< Innovations beyond are confident disagreements.
-  int cold_start_after = 6;       ///< Disagreements in a row that ask for a cold start.
-  double max_correlation = 0.85;  ///< Of measurements on keyframes that share all their points.
-  double initial_sigma = 0.02;    ///< Floor of the sigma of a scale given by stereo depth.
+  double min_distance = 0.02;         ///< Distance counted at least, a keyframe [median depths].
+  double learning_rate = 0.05;        ///< Of both noises from innovations; 0 holds them.
+  double gate_sigmas = 3.0;           ///< Innovations beyond are confident disagreements.
+  int cold_start_after = 6;           ///< Disagreements in a row that ask for a cold start.
+  int cold_start_after_agreeing = 3;  ///< The same of such that agree with each other.
+  double max_correlation = 0.85;      ///< Of measurements on keyframes that share all their points.
+  double initial_sigma = 0.02;        ///< Floor of the sigma of a scale given by stereo depth.
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -40,6 +41,8 @@ struct ScaleFilterConfig {
     v("learning_rate", learning_rate, "of process noise and measurement factor; 0 holds them");
     v("gate_sigmas", gate_sigmas, "innovations beyond this are disagreements");
     v("cold_start_after", cold_start_after, "disagreements in a row that ask for a cold start");
+    v("cold_start_after_agreeing", cold_start_after_agreeing,
+      "disagreements in a row that agree with each other and ask for a cold start");
     v("max_correlation", max_correlation,
       "correlation of measurements on keyframes that share all their points");
     v("initial_sigma", initial_sigma, "least sigma of a scale given by stereo depth");
@@ -111,6 +114,8 @@ class ScaleFilter {
   ScaleUpdate correct(const ScaleMeasurement& m, ScaleUpdate update);
   ScaleUpdate lock_on(const ScaleMeasurement& m, ScaleUpdate update, double variance);
   void disagree();
+  void disagree_with(const ScaleUpdate& update, double variance);
+  void agree_again();
   void learn(double innovation, double variance);
   double measured_variance(const ScaleMeasurement& m) const;
   bool within_gate(const ScaleUpdate& update) const;
@@ -125,6 +130,8 @@ class ScaleFilter {
   double measurement_factor_ = 1.0;
   double last_normalized_ = 0.0;  ///< Innovation over its standard deviation, the one before.
   int disagreements_ = 0;
+  int agreeing_ = 0;  ///< Of them, the newest that agree with each other.
+  std::optional<Candidate> rejected_;
   std::int64_t accepted_stamp_ns_ = 0;
   ScaleVerdict last_verdict_ = ScaleVerdict::kTooFewPoints;
   std::optional<Candidate> candidate_;

@@ -208,7 +208,10 @@ void BundleAdjuster::iterate(PhotometricProblem* problem, Window* window, Window
     const Backup backup(*window, problem->points());
     const bool small = apply_step(*now, dx, lambda, problem, window);
     ++result->iterations;
-    const bool last = (small && i + 1 >= config_.min_iterations) || i + 1 == max_iterations;
+    const bool converged = small && i + 1 >= config_.min_iterations;
+    // Moves nothing by more than some hundredths of a pixel: not worth another linearization.
+    if (converged && lambda <= config_.damping) break;
+    const bool last = converged || i + 1 == max_iterations;
     problem->linearize(*now, {.system = !last}, &next);
     const double new_energy = next.energy + prior_energy(*window);
     if (new_energy < energy) {
@@ -227,7 +230,7 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   BundleResult result;
   PhotometricProblem problem(config_, collect_points(window), window, pool_);
   window->update_geometry();
-  WindowLinearization known = problem.stored();
+  const WindowLinearization known = problem.stored();
   WindowLinearization now = known;
   const auto newest = static_cast<unsigned>(window->size() - 1);
   problem.linearize(known, {.system = false, .targets = 1U << newest}, &now);
@@ -239,8 +242,7 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   window->newest().freeze();
   window->update_geometry();
   update_outlier_threshold(now, window);
-  std::swap(known, now);
-  problem.linearize(known, {.system = false}, &now);  // fresh depth information
+  problem.reclassify(&now);
   problem.write_back(now);
   double energy = 0.0;
   for (const StoredResidual& r : now.residuals) {

@@ -11,6 +11,7 @@ namespace sovo {
 namespace {
 
 constexpr std::array<int, 6> kMaxIterations = {10, 20, 50, 50, 50, 50};
+constexpr int kRankIterations = 12;  ///< Enough to tell a good start from a bad one.
 constexpr double kStartLambda = 0.01;
 constexpr double kMinRejectLambda = 0.001;
 constexpr double kExtrapolationLimit = 0.001;
@@ -20,6 +21,14 @@ constexpr double kMaxCutoffFactor = 64.0;
 constexpr double kLevelRejectFactor = 1.5;
 /// More change of log-gain explains no image but an unrelated one, by taking its contrast away.
 constexpr double kMaxLogGain = 1.5;
+
+/// A motion and how badly it explains an image: RMSE over the root of the share of inliers.
+struct Ranked {
+  double score = 0.0;
+  SE3 T;
+};
+constexpr double kExplainsNothing = 1e9;
+constexpr std::size_t kFavourites = 4;  ///< Motions looked at again for each that is kept.
 
 /// Upper triangle of a 9x9 Gram matrix, four lanes each.
 using Accumulator = std::array<Lane, 45>;
@@ -274,7 +283,7 @@ CoarseTracker::Linearization CoarseTracker::linearize(const TrackingReference& r
 CoarseTracker::LevelOutcome CoarseTracker::align_level(const TrackingReference& reference,
                                                        int level, const ImageF& image,
                                                        double exposure_s, double* cutoff, SE3* T,
-                                                       Affine* affine) {
+                                                       Affine* affine, int max_iterations) {
   const ReferenceLevel& points = reference.levels[static_cast<std::size_t>(level)];
   const auto transfer_of = [&](const Affine& a) {
     return brightness_transfer(reference.affine, reference.exposure_s, a, exposure_s);
@@ -304,17 +313,25 @@ CoarseTracker::LevelOutcome CoarseTracker::align_level(const TrackingReference& 
   double energy = now.energy + prior_energy(*affine, now.in_view);
 
   double lambda = kStartLambda;
-  for (int it = 0; it < kMaxIterations[static_cast<std::size_t>(std::min(level, 5))]; ++it) {
+  bool accepted = false;
+  for (int it = 0; it < max_iterations; ++it) {
     const Vec8 gradient = now.b + prior.cwiseProduct(prior_error(*affine));
     const Vec8 step = damped_step(now.H, gradient, prior, units, lambda);
     const Vec8 x = units.cwiseProduct(step);
+    const bool converged = !(step.norm() > kStopNorm);
 
     const SE3 new_T = SE3::exp(x.head<6>()) * *T;
     const Affine new_affine{affine->a + x[6], affine->b + x[7]};
+    if (converged && accepted) {  // moves too little to be measured
+      *T = new_T;
+      *affine = new_affine;
+      break;
+    }
     Linearization next;
     residuals(points, image, new_T, transfer_of(new_affine), *cutoff, &next);
     const double new_energy = next.energy + prior_energy(new_affine, next.in_view);
-    if (new_energy < energy) {
+    accepted = new_energy < energy;
+    if (accepted) {
       normal_equations(transfer_of(new_affine), reference.affine.b, &next);
       now = next;
       energy = new_energy;
@@ -324,7 +341,7 @@ CoarseTracker::LevelOutcome CoarseTracker::align_level(const TrackingReference& 
     } else {
       lambda = std::max(lambda * 4.0, kMinRejectLambda);
     }
-    if (!(step.norm() > kStopNorm)) break;
+    if (converged) break;
   }
   out.last = now;
   out.rmse = std::sqrt(now.energy);
@@ -345,7 +362,8 @@ TrackingResult CoarseTracker::try_hypothesis(const TrackingReference& reference,
   for (int l = levels - 1; l >= 0; --l) {
     double cutoff = config_.cutoff;
     outcome = align_level(reference, l, pyramid.level(l), exposure_s, &cutoff,
-                          &result.T_current_reference, &result.affine);
+                          &result.T_current_reference, &result.affine,
+                          kMaxIterations[static_cast<std::size_t>(std::min(l, 5))]);
     double& best = (*best_rmse)[static_cast<std::size_t>(l)];
     if (!outcome.finite || outcome.rmse > kLevelRejectFactor * best) return result;
     if (cutoff > config_.cutoff && !repeated) {
@@ -393,29 +411,29 @@ std::vector<SE3> CoarseTracker::rank(const TrackingReference& reference,
                                      std::size_t keep) {
   const int coarsest =
       std::min(static_cast<int>(reference.levels.size()), pyramid.num_levels()) - 1;
-  std::vector<std::pair<double, SE3>> found;
-  for (const SE3& start : hypotheses) {
-    SE3 T = start;
-    double rmse = 0.0;
-    double in_view = 0.0;
-    for (int l = coarsest; l >= std::max(0, coarsest - 1); --l) {
+  std::vector<Ranked> ranked;
+  for (const SE3& start : hypotheses) ranked.push_back({0.0, start});
+  for (int l = coarsest; l >= std::max(0, coarsest - 1); --l) {
+    const ReferenceLevel& level = reference.levels[static_cast<std::size_t>(l)];
+    for (Ranked& r : ranked) {
       double cutoff = config_.cutoff;
       Affine affine = affine_guess;
-      const LevelOutcome o =
-          align_level(reference, l, pyramid.level(l), exposure_s, &cutoff, &T, &affine);
-      rmse = o.finite ? o.rmse : 1e10;
-      in_view = static_cast<double>(o.last.inliers) /
-                static_cast<double>(reference.levels[static_cast<std::size_t>(l)].size());
+      const LevelOutcome o = align_level(reference, l, pyramid.level(l), exposure_s, &cutoff, &r.T,
+                                         &affine, kRankIterations);
+      const double inliers =
+          static_cast<double>(o.last.inliers) / static_cast<double>(level.size());
+      // A motion that moves the points out of view explains nothing.
+      r.score = o.finite && inliers > 0.0 ? o.rmse / std::sqrt(inliers) : kExplainsNothing;
     }
-    // A motion that moves the points out of view explains nothing.
-    if (in_view > 0.0) found.emplace_back(rmse / std::sqrt(in_view), T);
+    std::erase_if(ranked, [](const Ranked& r) { return r.score >= kExplainsNothing; });
+    std::stable_sort(ranked.begin(), ranked.end(),
+                     [](const Ranked& a, const Ranked& b) { return a.score < b.score; });
+    // The coarsest level is the cheapest judge; the next one decides among its favourites.
+    const std::size_t most = l == coarsest ? kFavourites * keep : keep;
+    if (ranked.size() > most) ranked.resize(most);
   }
-  std::stable_sort(found.begin(), found.end(),
-                   [](const auto& a, const auto& b) { return a.first < b.first; });
   std::vector<SE3> out;
-  for (const auto& [score, T] : found) {
-    if (out.size() < keep) out.push_back(T);
-  }
+  for (const Ranked& r : ranked) out.push_back(r.T);
   return out;
 }
 

@@ -71,7 +71,8 @@ class CoarseTracker {
   void normal_equations(const BrightnessTransfer& transfer, double reference_b,
                         Linearization* out) const;
   LevelOutcome align_level(const TrackingReference& reference, int level, const ImageF& image,
-                           double exposure_s, double* cutoff, SE3* T, Affine* affine);
+                           double exposure_s, double* cutoff, SE3* T, Affine* affine,
+                           int max_iterations);
   TrackingResult try_hypothesis(const TrackingReference& reference, const ImagePyramid& pyramid,
                                 double exposure_s, const Affine& guess, const SE3& start,
                                 std::vector<double>* best_rmse);

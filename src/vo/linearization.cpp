@@ -85,17 +85,6 @@ void fill_cross(LinearizedResidual* r) {
   r->cross[7] = r->gram[tri(0, 3)] * r->du_rho + r->gram[tri(1, 3)] * r->dv_rho;
 }
 
-/// Decides from the energy and the outlier thresholds of its keyframes whether a residual is an
-/// inlier.
-void classify(const Keyframe& host, const Keyframe& target, LinearizedResidual* r) {
-  const auto threshold =
-      static_cast<float>(std::max(host.outlier_threshold, target.outlier_threshold));
-  const bool textured = r->gram[tri(0, 0)] + r->gram[tri(1, 1)] >= kMinGradientEnergy;
-  const bool inlier = r->raw_energy <= threshold && textured;
-  r->state = inlier ? ResidualState::kIn : ResidualState::kOutlier;
-  r->energy = inlier ? r->raw_energy : threshold;
-}
-
 }  // namespace
 
 void project_pattern(const Window& window, int host, int target, const Point& point,
@@ -163,7 +152,9 @@ float linearize_projected(const Window& window, const WindowConfig& config, int 
   geometric_jacobian(window.camera(), g, projection, out);
   sum_pattern(target_frame.image(), g, point, config, projection, out);
   fill_cross(out);
-  classify(window[host], target_frame, out);
+  const Verdict verdict = judge(window[host], target_frame, out->raw_energy, is_textured(*out));
+  out->state = verdict.state;
+  out->energy = verdict.energy;
   return out->energy;
 }
 
@@ -174,11 +165,22 @@ float linearize(const Window& window, const WindowConfig& config, int host, int 
   return linearize_projected(window, config, host, target, point, residual, projection, out);
 }
 
-void accumulate_depth(const LinearizedResidual& r, double* hessian, double* gradient) {
+Verdict judge(const Keyframe& host, const Keyframe& target, float raw_energy, bool textured) {
+  const auto threshold =
+      static_cast<float>(std::max(host.outlier_threshold, target.outlier_threshold));
+  if (raw_energy <= threshold && textured) return {ResidualState::kIn, raw_energy};
+  return {ResidualState::kOutlier, threshold};
+}
+
+bool is_textured(const LinearizedResidual& residual) {
+  return residual.gram[tri(0, 0)] + residual.gram[tri(1, 1)] >= kMinGradientEnergy;
+}
+
+DepthPart depth_part(const LinearizedResidual& r) {
   const auto& m = r.gram;
-  *hessian += r.du_rho * (m[tri(0, 0)] * r.du_rho + 2.0F * m[tri(0, 1)] * r.dv_rho) +
-              m[tri(1, 1)] * r.dv_rho * r.dv_rho;
-  *gradient += r.du_rho * r.gram_r[0] + r.dv_rho * r.gram_r[1];
+  return {r.du_rho * (m[tri(0, 0)] * r.du_rho + 2.0F * m[tri(0, 1)] * r.dv_rho) +
+              m[tri(1, 1)] * r.dv_rho * r.dv_rho,
+          r.du_rho * r.gram_r[0] + r.dv_rho * r.gram_r[1]};
 }
 
 void shift_residual(const Vec8& x, LinearizedResidual* residual) {

@@ -57,8 +57,22 @@ float linearize_projected(const Window& window, const WindowConfig& config, int 
 float linearize(const Window& window, const WindowConfig& config, int host, int target,
                 const Point& point, const Residual& residual, LinearizedResidual* out);
 
-/// Adds the part of a residual to a point's own H_rho_rho and b_rho.
-void accumulate_depth(const LinearizedResidual& residual, double* hessian, double* gradient);
+/// Whether a residual that is in view is an inlier: by its energy, the outlier thresholds of its
+/// keyframes, and whether its pattern has texture.
+struct Verdict {
+  ResidualState state = ResidualState::kOutlier;
+  float energy = 0.0F;  ///< As it counts.
+};
+Verdict judge(const Keyframe& host, const Keyframe& target, float raw_energy, bool textured);
+
+/// Whether the image gradients of the pattern say anything.
+bool is_textured(const LinearizedResidual& residual);
+
+/// Part of a residual in its point's own H_rho_rho and b_rho.
+struct DepthPart {
+  float hessian = 0.0F, gradient = 0.0F;
+};
+DepthPart depth_part(const LinearizedResidual& residual);
 
 /// r - J x for the displacement `x` (8, relative): changes `gram_r` so that later accumulation sees
 /// the residual as it would be at the linearization point of the poses.

@@ -27,7 +27,9 @@ void store(const LinearizedResidual& r, StoredResidual* out) {
   out->centre_u = r.centre_u;
   out->centre_v = r.centre_v;
   out->centre_rho = r.centre_rho;
+  out->depth = depth_part(r);
   out->state = r.state;
+  out->textured = is_textured(r);
 }
 
 }  // namespace
@@ -132,9 +134,9 @@ void PhotometricProblem::linearize_block(const Block& block, const WindowLineari
           if (request.at_frozen_poses) {
             shift_residual(shifts_[pair_index(block.host, r.target)], &r.linearized);
           }
-          accumulate_depth(r.linearized, &depth.hessian, &depth.gradient);
         }
         store(r.linearized, &out->residuals[k]);
+        depth.add(out->residuals[k]);
       }
       out->depths[i] = depth;
       if (request.system) {
@@ -162,6 +164,24 @@ void PhotometricProblem::linearize(const WindowLinearization& known, const Reque
     while (end < blocks_.size() && blocks_[end].host == blocks_[begin].host) ++end;
     add_host(*window_, blocks_[begin].host, {&sums_[begin], end - begin}, &out->system);
     begin = end;
+  }
+}
+
+void PhotometricProblem::reclassify(WindowLinearization* at) const {
+  for (const Block& block : blocks_) {
+    for (std::size_t i = block.begin; i < block.end; ++i) {
+      PointDepth depth;
+      for (std::size_t k = first_[i]; k < first_[i + 1]; ++k) {
+        StoredResidual& r = at->residuals[k];
+        if (r.state == ResidualState::kOutOfView) continue;
+        const Verdict verdict =
+            judge((*window_)[block.host], (*window_)[r.target], r.raw_energy, r.textured);
+        r.state = verdict.state;
+        r.energy = verdict.energy;
+        depth.add(r);
+      }
+      at->depths[i] = depth;
+    }
   }
 }
 

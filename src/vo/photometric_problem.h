@@ -7,6 +7,7 @@
 
 #include "sovo/image/image.h"
 #include "sovo/vo/direct_config.h"
+#include "sovo/vo/linearization.h"
 #include "sovo/vo/normal_equations.h"
 #include "sovo/vo/window.h"
 #include "sovo/vo/worker_pool.h"
@@ -31,13 +32,23 @@ struct alignas(64) StoredResidual {
   float energy = 0.0F;
   float raw_energy = 0.0F;
   float centre_u = 0.0F, centre_v = 0.0F, centre_rho = 0.0F;
+  DepthPart depth;  ///< Counts where the residual is an inlier.
   ResidualState state = ResidualState::kAbsent;
   std::uint8_t target = 0;  ///< Index in the window.
+  bool textured = false;
 };
+static_assert(sizeof(StoredResidual) == 64);
 
 /// A point's own H_rho_rho and b_rho.
 struct PointDepth {
   double hessian = 0.0, gradient = 0.0;
+
+  /// Adds the part of an inlier.
+  void add(const StoredResidual& r) {
+    if (r.state != ResidualState::kIn) return;
+    hessian += static_cast<double>(r.depth.hessian);
+    gradient += static_cast<double>(r.depth.gradient);
+  }
 };
 
 /// All residuals of some points, linearized.
@@ -71,6 +82,10 @@ class PhotometricProblem {
   /// Linearizes at the present estimate. `known`: states so far; what is out of view stays so.
   void linearize(const WindowLinearization& known, const Request& request,
                  WindowLinearization* out);
+
+  /// States, energies and depth information by the present outlier thresholds, from the residuals
+  /// as they were measured.
+  void reclassify(WindowLinearization* at) const;
 
   /// Moves the depths by back-substitution of the poses' step `dx`, damped by `lambda`.
   void step_depths(const WindowLinearization& at, const VecX& dx, double lambda);

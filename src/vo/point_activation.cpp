@@ -155,7 +155,11 @@ void PointActivator::evaluate(const Window& window, const Candidate& candidate, 
     const bool inlier = r.raw_energy < threshold * slack && r.gram[0] + r.gram[4] >= 2.0F;
     r.state = inlier ? ResidualState::kIn : ResidualState::kOutlier;
     out->energy += inlier ? r.raw_energy : threshold * slack;
-    if (inlier) accumulate_depth(r, &out->hessian, &out->gradient);
+    if (inlier) {
+      const DepthPart part = depth_part(r);
+      out->hessian += static_cast<double>(part.hessian);
+      out->gradient += static_cast<double>(part.gradient);
+    }
   }
 }
 

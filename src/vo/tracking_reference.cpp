@@ -95,14 +95,14 @@ DepthMap sum_down(const DepthMap& fine) {
 /// a depth.
 class DenseRows {
  public:
-  DenseRows(const DepthMap& map, bool diagonal)
-      : map_(map), diagonal_(diagonal), wanted_(static_cast<std::size_t>(map.width) / 64 + 1) {
+  explicit DenseRows(const DepthMap& map)
+      : map_(map), wanted_(static_cast<std::size_t>(map.width) / 64 + 1) {
     for (auto& row : dense_) row.resize(static_cast<std::size_t>(map.width));
     fill(0);
   }
 
-  /// Calls visit(x, cell) for every pixel of row y that has a depth or gets one: the mean of its
-  /// filled diagonal or axis neighbours. Rows ascend from 1, x ascends.
+  /// Calls visit(cell) for every pixel of row y that has a depth or gets one: the mean of its
+  /// filled neighbours in its row and column. Rows ascend from 1, x ascends.
   template <class Visit>
   void for_each(int y, const Visit& visit) {
     if (y == 1) fill(1);
@@ -111,7 +111,7 @@ class DenseRows {
     for (std::size_t word = 0; word < wanted_.size(); ++word) {
       for (std::uint64_t bits = std::exchange(wanted_[word], 0); bits != 0; bits &= bits - 1) {
         const int x = static_cast<int>(word * 64) + std::countr_zero(bits);
-        if (x >= 1 && x + 1 < map_.width) visit(x, at(x, y));
+        if (x >= 1 && x + 1 < map_.width) visit(at(x, y));
       }
     }
     clear(y - 1);
@@ -134,8 +134,8 @@ class DenseRows {
   }
   void mark(int row, bool middle) {
     for (const Cell& cell : sparse(row)) {
-      if (middle || !diagonal_) want(cell.x);
-      if (middle != diagonal_) {
+      want(cell.x);
+      if (middle) {
         want(cell.x - 1);
         want(cell.x + 1);
       }
@@ -144,11 +144,10 @@ class DenseRows {
   Cell at(int x, int y) {
     const Cell& own = dense(y)[static_cast<std::size_t>(x)];
     if (own.weight > 0.0F) return own;
-    constexpr std::array<Offset, 4> kDiagonal = {{{-1, -1}, {1, -1}, {-1, 1}, {1, 1}}};
-    constexpr std::array<Offset, 4> kAxis = {{{0, -1}, {-1, 0}, {1, 0}, {0, 1}}};
+    constexpr std::array<Offset, 4> kNeighbours = {{{0, -1}, {-1, 0}, {1, 0}, {0, 1}}};
     Cell mean{.x = x};
     int n = 0;
-    for (const Offset& o : diagonal_ ? kDiagonal : kAxis) {
+    for (const Offset& o : kNeighbours) {
       const Cell& cell = dense(y + o[1])[static_cast<std::size_t>(x + o[0])];
       if (cell.weight <= 0.0F) continue;
       mean.sum += cell.sum;
@@ -162,25 +161,41 @@ class DenseRows {
   }
 
   const DepthMap& map_;
-  bool diagonal_;
   std::array<std::vector<Cell>, 3> dense_;
   std::vector<std::uint64_t> wanted_;
 };
 
-/// Points of a level: the pixels with a depth, and their empty neighbours.
-void extract(const DepthMap& map, bool diagonal, const ImageF& image, ReferenceLevel* level) {
-  DenseRows rows(map, diagonal);
+/// Levels that have points enough as they are: neighbours would cost more than they add.
+constexpr int kSparseLevels = 2;
+
+/// Appends a pixel, if it can be tracked.
+void add_point(const ImageF& image, int y, const Cell& cell, ReferenceLevel* level) {
+  const bool inside = cell.x >= kBorder && cell.x < image.width() - kBorder;
+  if (!inside || cell.weight <= 0.0F) return;
+  const float rho = cell.sum / cell.weight;
+  const float colour = image.at(cell.x, y);
+  if (!(rho > 0.0F) || !std::isfinite(colour)) return;
+  level->u.push_back(static_cast<float>(cell.x));
+  level->v.push_back(static_cast<float>(y));
+  level->rho.push_back(rho);
+  level->colour.push_back(colour);
+}
+
+/// Points of a level: the pixels with a depth.
+void extract_sparse(const DepthMap& map, const ImageF& image, ReferenceLevel* level) {
+  for (int y = kBorder; y < image.height() - kBorder; ++y) {
+    for (const Cell& cell : map.rows[static_cast<std::size_t>(y)]) {
+      add_point(image, y, cell, level);
+    }
+  }
+}
+
+/// And their empty neighbours.
+void extract_dense(const DepthMap& map, const ImageF& image, ReferenceLevel* level) {
+  DenseRows rows(map);
   for (int y = 1; y < image.height() - kBorder; ++y) {
-    rows.for_each(y, [&](int x, const Cell& cell) {
-      const bool inside = y >= kBorder && x >= kBorder && x < image.width() - kBorder;
-      if (!inside || cell.weight <= 0.0F) return;
-      const float rho = cell.sum / cell.weight;
-      const float colour = image.at(x, y);
-      if (!(rho > 0.0F) || !std::isfinite(colour)) return;
-      level->u.push_back(static_cast<float>(x));
-      level->v.push_back(static_cast<float>(y));
-      level->rho.push_back(rho);
-      level->colour.push_back(colour);
+    rows.for_each(y, [&](Cell cell) {
+      if (y >= kBorder) add_point(image, y, cell, level);
     });
   }
 }
@@ -202,7 +217,8 @@ TrackingReference build_tracking_reference(const Window& window, int num_levels)
     if (l > 0) map = sum_down(map);
     ReferenceLevel& level = ref.levels[static_cast<std::size_t>(l)];
     level.camera = window.camera().at_level(l);
-    extract(map, l < 2, newest.pyramid->level(l), &level);
+    const auto extract = l < kSparseLevels ? extract_sparse : extract_dense;
+    extract(map, newest.pyramid->level(l), &level);
   }
   double sum = 0.0;
   for (const float rho : ref.levels[0].rho) sum += rho;

@@ -8,17 +8,9 @@
 
 #include "message_traits.h"
 #include "sovo/bridge/borrow.h"
+#include "sovo/bridge/message_kinds.h"
 
 namespace sovo::bridge {
-
-template <class T>
-concept IsMessage = requires {
-  MessageTraits<T>::kRosName;
-};
-template <class T>
-concept IsSequence = requires(T t) {
-  t._buffer;
-};
 
 /// Fills every field of a message with a value of its own and keeps what the message borrows.
 class MessageFiller {

@@ -135,7 +135,8 @@ TEST(StaticMatcher, SwappedImagesMatchOnlyBehindInfinity) {
       const auto u = static_cast<float>(x);
       const auto v = static_cast<float>(y);
       if (matcher.match(views.right, views.left, u, v).state == MatchState::kMatched) ++in_front;
-      const StaticMatch m = matcher.match(views.right, views.left, u, v, std::pair(-1.5F, -0.02F));
+      const StaticMatch m = matcher.match(views.right, views.left, u, v,
+                                          {.inverse_depth_range = std::pair(-1.5F, -0.02F)});
       if (m.state != MatchState::kMatched) continue;
       ++behind;
       EXPECT_LT(m.inverse_depth, 0.0F);
@@ -158,8 +159,8 @@ TEST(StaticMatcher, DecalibrationShowsAcrossTheCurve) {
     std::vector<double> across;
     for (int y = 12; y < 228; y += 12) {
       for (int x = 12; x < 364; x += 12) {
-        const StaticMatch m =
-            matcher.match(views.left, views.right, static_cast<float>(x), static_cast<float>(y));
+        const StaticMatch m = matcher.match(views.left, views.right, static_cast<float>(x),
+                                            static_cast<float>(y), {.across = true});
         if (m.state != MatchState::kMatched || m.across_sigma_px > 0.5F) continue;
         // Across points to the right-hand side of the way to nearer depths: here up the image.
         across.push_back(static_cast<double>(m.across_px));
@@ -262,12 +263,15 @@ TEST(StaticMatcher, ARangeNarrowsTheSearch) {
   const StaticMatch full = matcher.match(views.left, views.right, 200.0F, 60.0F);
   ASSERT_EQ(full.state, MatchState::kMatched);
   const std::pair around(full.inverse_depth - 0.05F, full.inverse_depth + 0.05F);
-  const StaticMatch near = matcher.match(views.left, views.right, 200.0F, 60.0F, around);
+  const StaticMatch near =
+      matcher.match(views.left, views.right, 200.0F, 60.0F, {.inverse_depth_range = around});
   ASSERT_EQ(near.state, MatchState::kMatched);
   EXPECT_NEAR(near.inverse_depth, full.inverse_depth, 0.2F * full.sigma);
   const std::pair elsewhere(full.inverse_depth + 0.5F, full.inverse_depth + 1.0F);
-  EXPECT_NE(matcher.match(views.left, views.right, 200.0F, 60.0F, elsewhere).state,
-            MatchState::kMatched);
+  EXPECT_NE(
+      matcher.match(views.left, views.right, 200.0F, 60.0F, {.inverse_depth_range = elsewhere})
+          .state,
+      MatchState::kMatched);
 }
 
 TEST(StaticMatcher, WhereTheRightCameraDoesNotLookIsOutOfView) {

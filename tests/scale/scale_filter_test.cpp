@@ -123,7 +123,7 @@ TEST(ScaleFilter, SixDisagreementsAskForAColdStart) {
   for (int i = 0; i < 20; ++i) filter.update(measure(0.0, 0.001));
   for (int i = 0; i < 6; ++i) {
     EXPECT_FALSE(filter.wants_cold_start());
-    filter.update(measure(0.4, 0.001));
+    filter.update(measure(i % 2 == 0 ? 0.4 : -0.4, 0.001));
   }
   EXPECT_TRUE(filter.wants_cold_start());
   EXPECT_TRUE(filter.locked());
@@ -131,6 +131,31 @@ TEST(ScaleFilter, SixDisagreementsAskForAColdStart) {
   EXPECT_TRUE(update.apply);
   EXPECT_DOUBLE_EQ(update.log_scale_correction, 0.4);
   EXPECT_FALSE(filter.wants_cold_start());
+}
+
+TEST(ScaleFilter, ThreeDisagreementsThatAgreeWithEachOtherAskForAColdStart) {
+  ScaleFilter filter = locked_filter();
+  for (int i = 0; i < 20; ++i) filter.update(measure(0.0, 0.001));
+  for (const double wrong : {-0.4, 0.401, 0.399}) {
+    filter.update(measure(wrong, 0.001));
+    EXPECT_FALSE(filter.wants_cold_start());
+  }
+  filter.update(measure(0.4, 0.001));
+  EXPECT_TRUE(filter.wants_cold_start());
+  EXPECT_FALSE(filter.update(measure(0.4, 0.001, false, ScaleVerdict::kTooFewPoints)).apply);
+  EXPECT_DOUBLE_EQ(filter.update(measure(0.4, 0.001, true)).log_scale_correction, 0.4);
+  EXPECT_FALSE(filter.wants_cold_start());
+}
+
+TEST(ScaleFilter, AgreementBeginsAnewAfterAnAcceptedMeasurement) {
+  ScaleFilter filter = locked_filter();
+  for (int i = 0; i < 20; ++i) filter.update(measure(0.0, 0.001));
+  for (int i = 0; i < 10; ++i) {
+    filter.update(measure(0.4, 0.001));
+    filter.update(measure(0.4, 0.001));
+    EXPECT_TRUE(filter.update(measure(0.0, 0.001)).apply);
+    EXPECT_FALSE(filter.wants_cold_start());
+  }
 }
 
 TEST(ScaleFilter, AColdStartThatAgreesEndsTheDoubt) {
@@ -146,7 +171,7 @@ TEST(ScaleFilter, AColdStartThatAgreesEndsTheDoubt) {
 TEST(ScaleFilter, MissesCountNeitherForNorAgainst) {
   ScaleFilter filter = locked_filter();
   for (int i = 0; i < 20; ++i) filter.update(measure(0.0, 0.001));
-  for (int i = 0; i < 5; ++i) filter.update(measure(0.4, 0.001));
+  for (int i = 0; i < 5; ++i) filter.update(measure(i % 2 == 0 ? 0.4 : -0.4, 0.001));
   const double before = filter.sigma();
   for (const ScaleVerdict miss :
        {ScaleVerdict::kTooFewPoints, ScaleVerdict::kUnobservable, ScaleVerdict::kNoRightImage}) {

@@ -6,7 +6,7 @@ REPEATS=$(sed 's/.*repeats=\([^ ]*\).*/\1/' /proc/cmdline)
 SECONDS_EACH=$(sed 's/.*seconds=\([^ ]*\).*/\1/' /proc/cmdline)
 export BIN REPEATS SECONDS_EACH
 
-begin() { echo "CASE $1"; }
+begin() { printf '\nCASE %s\n' "$1"; }  # on a line of its own, whatever the console said
 
 # calibration WIDTH HEIGHT FILE: cameras of that size, one eye.
 calibration() {

@@ -169,11 +169,26 @@ class Cameras(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls):
-        for _ in range(2):  # a kernel that panics gets a second chance
+        for again in (True, False):
             cls.output = cls.machine.boot("guest_cameras.sh", 3000 if LONG else 800)
-            if "GUEST ENDED with 0" in cls.output:
+            cls.cases = cases_of(cls.output)
+            reason = cls.reason_to_boot_again()
+            if not reason or not again:
                 break
-        cls.cases = cases_of(cls.output)
+            print(f"booting once more: {reason}")
+
+    @classmethod
+    def reason_to_boot_again(cls):
+        """A kernel that panics and a host that stands still for longer than a driver's buffers
+        hold are no fault of the cameras' code; twice in a row, they are."""
+        if "GUEST ENDED with 0" not in cls.output:
+            return "the machine did not end as it should"
+        for case in ("zed_stream", "loopback"):
+            for line in cls.cases.get(case, []):
+                result = json.loads(line[7:]) if line.startswith("RESULT ") else {}
+                if result.get("missing") or result.get("uncounted"):
+                    return f"{case} lost images: {line}"
+        return None
 
     def lines(self, case):
         self.assertIn(case, self.cases, self.output[-3000:])
@@ -192,10 +207,6 @@ class Cameras(unittest.TestCase):
         dropped = result["skipped"] + result["damaged"] + result["short"] + result["no_room"]
         self.assertLessEqual(result["missing"], dropped + result["queue_dropped"], result)
 
-    def expect_few_missing(self, result):
-        """None in the long form; in the short one the host may be busy, and its machine slow."""
-        self.assertLessEqual(result["missing"], 0 if LONG else result["frames"] // 10, result)
-
     def test_zed_lists_its_modes_and_controls(self):
         text = "\n".join(self.lines("zed_list"))
         for part in ("2b03:f582", "serial 0012345", "mode 4416x1242 YUYV at 15 Hz",
@@ -207,7 +218,7 @@ class Cameras(unittest.TestCase):
         result = self.result("zed_stream")
         self.expect_whole(result)
         self.assertGreaterEqual(result["frames"], 100)
-        self.expect_few_missing(result)
+        self.assertEqual(result["missing"], 0, result)
         self.assertAlmostEqual(result["exposure_ms"], 4.2, 4)  # as the control was set
 
     def test_the_command_publishes(self):
@@ -240,10 +251,8 @@ class Cameras(unittest.TestCase):
 
     def test_loopback_content(self):
         result = self.result("loopback")
-        # The loopback driver overwrites an image that waits too long, and counts no step for it.
-        for fault in ("torn", "mixed", "not_rising"):
-            self.assertEqual(result[fault], 0, result)
-        self.expect_few_missing(result)
+        self.expect_whole(result)
+        self.assertEqual(result["missing"], 0, result)
         self.assertGreater(result["frames"], 20)
 
     def test_vivid_faults_are_survived_and_counted(self):

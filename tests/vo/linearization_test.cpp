@@ -110,9 +110,9 @@ class WindowJacobian : public ::testing::Test {
 
   /// The same from the linearization under test.
   void normal_equations(Mat9* H, Vec9* b) {
-    double hessian = 0.0;
-    double gradient = 0.0;
-    accumulate_depth(linearized_, &hessian, &gradient);
+    const DepthPart depth = depth_part(linearized_);
+    const double hessian = static_cast<double>(depth.hessian);
+    const double gradient = static_cast<double>(depth.gradient);
     HostSums sums;
     sums.clear(2);
     const std::vector<TargetResidual> residuals = {{1, linearized_}};

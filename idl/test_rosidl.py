@@ -1,6 +1,9 @@
 #!/usr/bin/env python3
 """Tests of rosidl.py and check_interfaces.py: every kind of disagreement must be found."""
 
+import pathlib
+import shutil
+import tempfile
 import unittest
 
 import check_interfaces
@@ -63,6 +66,25 @@ class CheckTest(unittest.TestCase):
         self.assertEqual(len(check_interfaces.check({key: time}, {}, {})), 1)
         bad = {key: good[key][:-1] + "x"}
         self.assertEqual(len(check_interfaces.check({key: time}, {key: time}, bad)), 1)
+
+
+class PackageTest(unittest.TestCase):
+    PACKAGE = pathlib.Path(__file__).parent.parent / "ros2" / "sovo_msgs"
+
+    def test_what_colcon_needs_is_missed(self):
+        self.assertEqual(check_interfaces.check_package(self.PACKAGE), [])
+        for file, old, new in [("package.xml", "<depend>std_msgs</depend>", ""),
+                               ("package.xml", "rosidl_interface_packages", "others"),
+                               ("package.xml", "<name>sovo_msgs", "<name>other"),
+                               ("CMakeLists.txt", "find_package(geometry_msgs REQUIRED)", ""),
+                               ("CMakeLists.txt", " geometry_msgs std_msgs)", " std_msgs)")]:
+            with self.subTest(file=file, old=old), tempfile.TemporaryDirectory() as folder:
+                package = pathlib.Path(folder) / "sovo_msgs"
+                shutil.copytree(self.PACKAGE, package)
+                text = (package / file).read_text()
+                self.assertIn(old, text)
+                (package / file).write_text(text.replace(old, new))
+                self.assertEqual(len(check_interfaces.check_package(package)), 1)
 
 
 if __name__ == "__main__":

@@ -78,6 +78,8 @@ struct ReplaySection {
   double start = 0.0;
   bool loop = false;
   bool all = false;
+  std::string left;  ///< Image topics of a bag's cameras; empty: found by their names.
+  std::string right;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -85,6 +87,8 @@ struct ReplaySection {
     v("rate", rate, "speed: 1 is real time, max as fast as the odometry goes");
     v("start", start, "left out at the beginning [s]");
     v("loop", loop, "begin again at the end");
+    v("left", left, "left image topic that --rate max follows; empty: found by its name");
+    v("right", right, "its right image topic");
     v("all", all, "also topics that others on the bus write now, and recorded commands");
   }
 };
@@ -118,7 +122,7 @@ struct NodeSection {
   template <class Visitor>
   void visit(Visitor& v) {
     v("publish_tf", publish_tf, "publish odom -> base_link; false beside another filter");
-    v("left", left, "left image topic of a ROS 2 driver; empty: frames of sovo camera");
+    v("left", left, "left image topic of a ROS 2 driver or bag; empty: frames of sovo");
     v("right", right, "its right image topic");
     v("pair_tolerance_s", pair_tolerance_s, "largest difference of stamps in its pairs [s]");
     v("idle_exit_s", idle_exit_s, "sovo vo ends when no frame came this long [s]; 0: never");

@@ -11,6 +11,7 @@ void add_calib_command(const Command& program);
 void add_camera_command(const Command& program);
 void add_command_command(const Command& program);
 void add_config_command(const Command& program);
+void add_convert_command(const Command& program);
 void add_dashboard_command(const Command& program);
 void add_doctor_command(const Command& program);
 void add_eval_command(const Command& program);

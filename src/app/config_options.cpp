@@ -103,6 +103,9 @@ Result<void> check_config(const AppConfig& config) {
   if (config.node.left.empty() != config.node.right.empty()) {
     return Error{"node.left and node.right (--left, --right) are given together"};
   }
+  if (config.replay.left.empty() != config.replay.right.empty()) {
+    return Error{"replay.left and replay.right (--left, --right) are given together"};
+  }
   if (!(config.node.pair_tolerance_s >= 0.0)) {
     return Error{"node.pair_tolerance_s must not be negative"};
   }

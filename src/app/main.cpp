@@ -37,6 +37,7 @@ int run(int argc, char** argv) {
   add_record_command(root);
   add_replay_command(root);
   add_recover_command(root);
+  add_convert_command(root);
   add_replay_test_command(root);
   add_eval_command(root);
   add_bench_command(root);

@@ -6,7 +6,8 @@
 
 namespace sovo::app {
 
-Result<FrameInput> open_mcap_input(const CameraSection& camera) {
+Result<FrameInput> open_mcap_input(const AppConfig& config) {
+  const CameraSection& camera = config.camera;
   if (camera.reverse) return Error{"a recording cannot be run backwards; leave --reverse out"};
   const auto rate = parse_rate(camera.rate, 0.0);
   if (!rate) return rate.failure();
@@ -15,18 +16,22 @@ Result<FrameInput> open_mcap_input(const CameraSection& camera) {
         "sovo run goes through a recording as fast as it can; for real time use sovo "
         "replay and sovo vo"};
   }
-  std::optional<StereoCameras> given;
+  bridge::McapSourceConfig wanted;
+  wanted.path = camera.mcap;
+  wanted.topics = {config.node.left, config.node.right, config.node.pair_tolerance_s};
+  wanted.start = camera.start;
+  wanted.frames = camera.frames;
   if (!camera.calibration.empty()) {
     auto calibration = load_calibration(camera.calibration);
     if (!calibration) return calibration.failure();
-    given = to_cameras(*calibration);
+    wanted.calibration = to_cameras(*calibration);
   }
-  auto source = bridge::McapSource::open(camera.mcap, given, camera.start, camera.frames);
+  auto source = bridge::McapSource::open(wanted);
   if (!source) return source.failure();
   for (const std::string& note : (*source)->notes()) spdlog::warn("{}", note);
   const StereoRig& rig = (*source)->rig();
-  spdlog::info("{}: {} frames of {}x{}, baseline {:.3f} m", camera.mcap, *(*source)->size(),
-               rig.left.width, rig.left.height, rig.baseline());
+  spdlog::info("{}: {}, {} frames of {}x{}, baseline {:.3f} m", camera.mcap, (*source)->about(),
+               *(*source)->size(), rig.left.width, rig.left.height, rig.baseline());
   FrameInput input;
   input.cameras = (*source)->cameras();
   input.original_stamp = [](std::int64_t fed) { return fed; };

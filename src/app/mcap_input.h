@@ -4,7 +4,8 @@
 
 namespace sovo::app {
 
-/// Opens the recording of the configuration (`camera.mcap`) and logs what is wrong with its files.
-Result<FrameInput> open_mcap_input(const CameraSection& camera);
+/// Opens the recording of the configuration (`camera.mcap`; `node.left` and `node.right` name its
+/// image topics) and logs what is wrong with its files.
+Result<FrameInput> open_mcap_input(const AppConfig& config);
 
 }  // namespace sovo::app

@@ -109,6 +109,7 @@ void add_record_command(const Command& program) {
   const Command command = program.add_command("record", "Record topics of the bus");
   auto options = std::make_shared<ConfigOptions>(command);
   options->value("-o,--out", "record.out", "Folder of the recording, or one file", "DIR|X.mcap")
+      .flag("--ros-images", "record.ros_images", "Write stereo frames as Image and CameraInfo")
       .value("--topics", "record.topics", "Topics beside the default set; all: every known type",
              "A,B")
       .value("--split", "record.split", "Begin another file beyond this size", "SIZE")

@@ -54,6 +54,9 @@ void add_replay_command(const Command& program) {
   options->value("recording", "replay.path", "Folder or .mcap file", "DIR|FILE")
       .value("--rate", "replay.rate", "Speed: 1 is real time, max as fast as the odometry", "X|max")
       .value("--start", "replay.start", "Left out at the beginning [s]", "S")
+      .value("--left", "replay.left", "Image topic of the left camera, when names do not say",
+             "TOPIC")
+      .value("--right", "replay.right", "That of the right camera", "TOPIC")
       .flag("--loop", "replay.loop", "Begin again at the end")
       .flag("--all", "replay.all", "Also what a live odometry writes, and recorded commands");
   add_dds_options(*options);

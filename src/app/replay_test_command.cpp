@@ -25,7 +25,7 @@ Result<Golden> run_recording(AppConfig config) {
   config.odometry.deterministic = true;
   config.odometry.wait_for_mapping = true;
   StopSignal stop;  // before the threads of source and odometry
-  auto input = open_mcap_input(config.camera);
+  auto input = open_mcap_input(config);
   if (!input) return input.failure();
   GoldenRecorder recorder;
   StereoOdometry odometry(config.odometry, input->cameras, &recorder, nullptr);
@@ -99,6 +99,8 @@ void add_replay_test_command(const Command& program) {
   options->value("recording", "camera.mcap", "Folder or .mcap file", "DIR|FILE")
       .value("--calib", "camera.calibration", "Calibration file, instead of the recorded one",
              "FILE")
+      .value("--left", "node.left", "Image topic of the left camera", "TOPIC")
+      .value("--right", "node.right", "That of the right camera", "TOPIC")
       .value("--mode", "mode", "Who owns the metric scale", "mono|scale")
       .value("--seed", "seed", "Of every random choice", "N");
   command.option("--golden", "Golden file to compare with", &arguments->file).type("FILE.json");

@@ -6,6 +6,7 @@
 #include <array>
 #include <thread>
 
+#include "sovo/bridge/cdr_codec.h"
 #include "sovo/bridge/frame_number.h"
 #include "sovo/bridge/offered_qos.h"
 #include "sovo/bridge/ros_conversion.h"
@@ -22,6 +23,8 @@ constexpr auto kReplayPatience = 5s;
 constexpr auto kLookPeriod = 200ms;
 constexpr auto kReplaySlice = 20ms;
 constexpr std::uint64_t kClockPeriodNs = 10'000'000;
+constexpr std::uint64_t kImagesAhead = 4;  // so that one without its partner is tracked alone
+constexpr std::size_t kImagesKnown = 64;
 constexpr char kFrameType[] = "sovo_msgs/msg/StereoFrame";
 
 /// What an odometry process writes.
@@ -60,7 +63,29 @@ Result<std::unique_ptr<Replayer>> Replayer::open(const bridge::Participant& part
   return replayer;
 }
 
+/// In a bag of another system the frames are the images of two cameras.
+Result<void> Replayer::find_cameras() {
+  const auto& all = recording_->topics();
+  const bool has_frames = std::any_of(all.begin(), all.end(), [](const auto& topic) {
+    return topic.second.type == kFrameType && topic.second.messages > 0;
+  });
+  if (has_frames) return {};
+  auto images = bridge::find_image_topics(*recording_, config_.left, config_.right);
+  if (images) {
+    images_ = std::move(*images);
+  } else if (!config_.left.empty()) {
+    return images.failure();
+  }
+  return {};
+}
+
+/// Whether a message of the topic begins a stereo frame.
+bool Replayer::is_frame(const RecordedTopic& topic) const {
+  return topic.type == kFrameType || (images_ && topic.topic == images_->left);
+}
+
 Result<void> Replayer::open_outputs() {
+  if (auto found = find_cameras(); !found) return found;
   for (const auto& [name, topic] : recording_->topics()) {
     if (topic.messages == 0 || name == topics::kClock) continue;
     if (!config_.all && is_one_of(kOfUsers, name)) continue;
@@ -73,7 +98,7 @@ Result<void> Replayer::open_outputs() {
     auto writer = bridge::RawWriter::open(participant_, name, schema, qos);
     if (!writer) return writer.failure();
     outputs_[name] = {std::make_shared<bridge::RawWriter>(std::move(*writer)), qos.latched,
-                      is_one_of(kOfVo, name), topic.type == kFrameType};
+                      is_one_of(kOfVo, name), is_frame(topic)};
   }
   return {};
 }
@@ -112,6 +137,7 @@ void Replayer::wait_for_listener(const Stop& stop) {
   while (!stop() && Clock::now() - begin < kReplayPatience) {
     look_for_vo();
     if (is_heard() && (vo_is_live_ || !follow)) return;
+    introduce();
     std::this_thread::sleep_for(kReplaySlice);
   }
   if (!is_heard()) {
@@ -122,9 +148,32 @@ void Replayer::wait_for_listener(const Stop& stop) {
   }
 }
 
+/// An odometry that waits for camera_info tells its state only when it has heard it.
+void Replayer::read_introductions() {
+  introductions_.clear();
+  if (!images_) return;
+  for (const std::string& image : {images_->left, images_->right}) {
+    const std::string info = bridge::info_topic(image);
+    if (!outputs_.contains(info)) continue;
+    recording_->seek(from_ns_, [&](const RecordedTopic& topic) { return topic.topic == info; });
+    if (const auto message = recording_->next()) {
+      introductions_.push_back({info, Bytes(message->data.begin(), message->data.end()),
+                                static_cast<std::int64_t>(message->publish_ns)});
+    }
+  }
+}
+
+void Replayer::introduce() {
+  if (rate_ != 0.0) return;
+  for (const Introduction& introduction : introductions_) {
+    bridge::RawWriter& writer = *outputs_.at(introduction.topic).writer;
+    if (writer.num_readers() > 0) (void)writer.write(introduction.data, introduction.publish_ns);
+  }
+}
+
 /// When the first frame from the start on was recorded; the start in a recording without frames.
 std::uint64_t Replayer::first_frame_ns() {
-  recording_->seek(from_ns_, [](const RecordedTopic& topic) { return topic.type == kFrameType; });
+  recording_->seek(from_ns_, [this](const RecordedTopic& topic) { return is_frame(topic); });
   const auto frame = recording_->next();
   return frame ? frame->log_ns : from_ns_;
 }
@@ -153,18 +202,44 @@ Result<void> Replayer::publish(const RecordedMessage& message) {
   return output.writer->write(message.data, static_cast<std::int64_t>(message.publish_ns));
 }
 
-/// As fast as the odometry goes: frames wait for it.
-void Replayer::follow_vo(const RecordedMessage& message, const Stop& stop) {
-  if (message.topic->type != kFrameType || !vo_is_live_) return;
+/// The number of a frame; the follower is that of its session.
+std::optional<std::uint64_t> Replayer::follow_frame(const RecordedMessage& message) {
   const auto number = bridge::frame_number(message.data);
-  if (!number) return;
+  if (!number) return std::nullopt;
   if (!follower_ || followed_session_ != number->session) {
     auto follower = VoFollower::open(participant_, number->session);
-    if (!follower) return;
+    if (!follower) return std::nullopt;
     follower_.emplace(std::move(*follower));
     followed_session_ = number->session;
   }
-  follower_->wait_before(number->sequence, stop);
+  return number->sequence;
+}
+
+/// Images are known by their stamps.
+std::optional<std::uint64_t> Replayer::follow_image(const RecordedMessage& message) {
+  const auto header = bridge::decode<bridge::msg::Header>(message.data);
+  if (!header) return std::nullopt;
+  if (!follower_) {
+    const auto numbering = [this](const bridge::msg::VoStatus& status) {
+      const auto sent = sent_images_.find(bridge::stamp_ns(status.header.stamp));
+      using Number = std::optional<std::uint64_t>;
+      return sent == sent_images_.end() ? Number() : Number(sent->second);
+    };
+    auto follower = VoFollower::open(participant_, numbering, kImagesAhead);
+    if (!follower) return std::nullopt;
+    follower_.emplace(std::move(*follower));
+  }
+  const std::uint64_t number = num_images_++;
+  sent_images_[bridge::stamp_ns((*header)->stamp)] = number;
+  if (sent_images_.size() > kImagesKnown) sent_images_.erase(sent_images_.begin());
+  return number;
+}
+
+/// As fast as the odometry goes: frames wait for it.
+void Replayer::follow_vo(const RecordedMessage& message, const Stop& stop) {
+  if (!is_frame(*message.topic) || !vo_is_live_) return;
+  const auto number = images_ ? follow_image(message) : follow_frame(message);
+  if (number) follower_->wait_before(*number, stop);
 }
 
 void Replayer::pace(const RecordedMessage& message, const Stop& stop) {
@@ -191,6 +266,7 @@ Result<void> Replayer::play(const Stop& stop, const std::function<void(const Sta
   state_.duration_s = recording_->duration_s();
   const std::uint64_t first_frame = first_frame_ns();
   if (auto done = publish_latched(first_frame); !done) return done;
+  read_introductions();
   wait_for_listener(stop);
   recording_->seek(from_ns_,
                    [this](const RecordedTopic& topic) { return outputs_.contains(topic.topic); });

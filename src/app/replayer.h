@@ -10,6 +10,7 @@
 
 #include "sovo/app/app_config.h"
 #include "sovo/app/vo_follower.h"
+#include "sovo/bridge/image_topics.h"
 #include "sovo/bridge/raw_writer.h"
 #include "sovo/bridge/topic_discovery.h"
 #include "sovo/bridge/writer.h"
@@ -45,6 +46,12 @@ class Replayer {
     bool of_vo = false;   ///< Left out while a live odometry is on the bus.
     bool frames = false;  ///< Of a camera.
   };
+  /// A message that is sent before its time.
+  struct Introduction {
+    std::string topic;
+    Bytes data;
+    std::int64_t publish_ns = 0;
+  };
   using Clock = std::chrono::steady_clock;
 
   Replayer(const bridge::Participant& participant, const ReplaySection& config, double rate,
@@ -58,6 +65,10 @@ class Replayer {
         clock_(std::move(clock)) {}
 
   Result<void> open_outputs();
+  Result<void> find_cameras();
+  bool is_frame(const RecordedTopic& topic) const;
+  void read_introductions();
+  void introduce();
   void look_for_vo();
   bool is_heard() const;
   void wait_for_listener(const Stop& stop);
@@ -65,6 +76,8 @@ class Replayer {
   Result<void> publish_latched(std::uint64_t before_ns);
   Result<void> publish(const RecordedMessage& message);
   void follow_vo(const RecordedMessage& message, const Stop& stop);
+  std::optional<std::uint64_t> follow_frame(const RecordedMessage& message);
+  std::optional<std::uint64_t> follow_image(const RecordedMessage& message);
   void pace(const RecordedMessage& message, const Stop& stop);
   Result<void> tell_time(std::uint64_t log_ns);
 
@@ -75,8 +88,12 @@ class Replayer {
   bridge::TopicDiscovery discovery_;
   bridge::Writer<bridge::msg::Clock> clock_;
   std::map<std::string, Output> outputs_;
+  std::optional<bridge::ImageTopics> images_;  ///< Of the cameras in a recording without frames.
+  std::vector<Introduction> introductions_;
   std::optional<VoFollower> follower_;
   std::uint64_t followed_session_ = 0;
+  std::map<std::int64_t, std::uint64_t> sent_images_;  ///< Numbers of the latest, by their stamp.
+  std::uint64_t num_images_ = 0;
   bool vo_is_live_ = false;
   Clock::time_point next_look_{};
   Clock::time_point began_{};

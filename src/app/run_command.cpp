@@ -58,7 +58,7 @@ int run(AppConfig config, bool simulated) {
   }
   StopSignal stop;  // before the threads of source and odometry
   auto input = simulated  ? open_sim_input(config, 0.0, true)
-               : recorded ? open_mcap_input(config.camera)
+               : recorded ? open_mcap_input(config)
                           : open_dataset_input(config.camera, 0.0);
   if (!input) return fail(kBadInput, input.error());
   // As fast as can be means that the source waits for the odometry and nothing is dropped.
@@ -78,6 +78,8 @@ void add_run_command(const Command& program) {
   auto options = std::make_shared<ConfigOptions>(command);
   options->value("--dataset", "camera.path", "Folder of the dataset", "DIR")
       .value("--mcap", "camera.mcap", "Recording: an .mcap file or a folder", "FILE|DIR")
+      .value("--left", "node.left", "With --mcap: image topic of the left camera", "TOPIC")
+      .value("--right", "node.right", "With --mcap: that of the right camera", "TOPIC")
       .value("--rate", "camera.rate", "Speed: 1.0 is real time, max as fast as can be", "X|max");
   add_sim_options(*options);
   add_dataset_options(*options);

@@ -19,7 +19,9 @@
 namespace sovo::app {
 namespace {
 
+using bridge::msg::RecorderStatus;
 using bridge::msg::ScaledOdometry;
+using ReplayClock = bridge::msg::Clock;
 using bridge::msg::StereoCalibration;
 using bridge::msg::VoStatus;
 using Clock = std::chrono::steady_clock;
@@ -33,13 +35,16 @@ struct StatusOptions {
   std::string truth;
 };
 
-void show(const VoStatus& status, const StatusOptions& options) {
+void show(const VoStatus& status, const StatusSurroundings& surroundings,
+          const StatusOptions& options) {
   if (options.json) {
     std::cout << to_json(status).dump() << std::endl;
     return;
   }
   const bool redraw = !options.once && isatty(STDOUT_FILENO) == 1;
-  std::cout << (redraw ? "\x1b[H\x1b[J" : "") << status_screen(status) << std::endl;
+  std::cout << (redraw ? "\x1b[H\x1b[J" : "")
+            << status_screen(status, surroundings.text(status, Clock::now(), dds_time()))
+            << std::endl;
 }
 
 std::string silence_on(const std::string& topic) {
@@ -47,6 +52,39 @@ std::string silence_on(const std::string& topic) {
       "nothing on {} for {} s; is sovo vo running, in the same domain and namespace?", topic,
       kStatusPatience.count());
 }
+
+/// The topics that stand beside the odometry's state.
+class SurroundingsFeed {
+ public:
+  static Result<SurroundingsFeed> open(const bridge::Participant& participant) {
+    namespace topics = bridge::topics;
+    auto odometry = bridge::Reader<ScaledOdometry>::open(participant, topics::kScaledOdometry,
+                                                         topics::kScaledOdometryQos);
+    if (!odometry) return odometry.failure();
+    auto recorder = bridge::Reader<RecorderStatus>::open(participant, topics::kRecordStatus,
+                                                         topics::kRecordStatusQos);
+    if (!recorder) return recorder.failure();
+    auto clock = bridge::Reader<ReplayClock>::open(participant, topics::kClock, topics::kClockQos);
+    if (!clock) return clock.failure();
+    return SurroundingsFeed(std::move(*odometry), std::move(*recorder), std::move(*clock));
+  }
+
+  void update(StatusSurroundings* to) {
+    const auto now = Clock::now();
+    (void)odometry_.take_each([&](const ScaledOdometry& m, const auto&) { to->add(m); });
+    (void)recorder_.take_each([&](const RecorderStatus& m, const auto&) { to->add(m, now); });
+    (void)clock_.take_each([&](const ReplayClock& m, const auto&) { to->add(m, now); });
+  }
+
+ private:
+  SurroundingsFeed(bridge::Reader<ScaledOdometry> odometry, bridge::Reader<RecorderStatus> recorder,
+                   bridge::Reader<ReplayClock> clock)
+      : odometry_(std::move(odometry)), recorder_(std::move(recorder)), clock_(std::move(clock)) {}
+
+  bridge::Reader<ScaledOdometry> odometry_;
+  bridge::Reader<RecorderStatus> recorder_;
+  bridge::Reader<ReplayClock> clock_;
+};
 
 /// Every status, or five a second for people.
 int watch(const AppConfig& config, const StatusOptions& options) {
@@ -56,17 +94,22 @@ int watch(const AppConfig& config, const StatusOptions& options) {
   auto reader = bridge::Reader<VoStatus>::open(*participant, bridge::topics::kStatus,
                                                bridge::topics::kStatusQos);
   if (!reader) return fail(kFailed, reader.error());
+  auto feed = SurroundingsFeed::open(*participant);
+  if (!feed) return fail(kFailed, feed.error());
+  StatusSurroundings surroundings;
 
   auto last = Clock::now();
   auto last_shown = last - kStatusPatience;
   while (!stop.requested()) {
     reader->wait(std::chrono::milliseconds(200));
     bool done = false;
+    feed->update(&surroundings);
     const auto taken = reader->take_each([&](const VoStatus& status, const auto&) {
       last = Clock::now();
+      surroundings.add(status, last);
       const bool due = options.json || last - last_shown > std::chrono::milliseconds(200);
       if (done || !due) return;
-      show(status, options);
+      show(status, surroundings, options);
       last_shown = last;
       done = options.once;
     });

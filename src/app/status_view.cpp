@@ -11,6 +11,11 @@
 namespace sovo::app {
 namespace {
 
+constexpr std::chrono::seconds kRateWindow(2);
+constexpr std::chrono::seconds kClockPatience(2);     // a replay publishes it all the time
+constexpr std::chrono::seconds kRecorderPatience(3);  // it speaks once a second
+constexpr double kOldestLive = 10.0;                  // [s]; older stamps are those of a recording
+
 std::string text_or_dash(const char* text) { return text == nullptr || *text == '\0' ? "-" : text; }
 
 std::string stage_lines(const bridge::msg::VoStatus& s) {
@@ -25,7 +30,7 @@ std::string stage_lines(const bridge::msg::VoStatus& s) {
 
 }  // namespace
 
-std::string status_screen(const bridge::msg::VoStatus& s) {
+std::string status_screen(const bridge::msg::VoStatus& s, const std::string& surroundings) {
   const auto state = to_string(static_cast<OdometryState>(s.state));
   std::string text = fmt::format("state       {} ({})\n", state, text_or_dash(s.reason));
   text += fmt::format("frame       {} of session {:x}; latency {:.1f} ms, queue {}\n", s.sequence,
@@ -38,8 +43,78 @@ std::string status_screen(const bridge::msg::VoStatus& s) {
                       1e3 * s.sync_error_s);
   text += fmt::format("distance    {:.2f} m, {} resets\n", s.distance_m, s.reset_counter);
   text +=
-      fmt::format("command     {} {}\n\n", s.last_command_id, text_or_dash(s.last_command_result));
-  return text + stage_lines(s);
+      fmt::format("command     {} {}\n", s.last_command_id, text_or_dash(s.last_command_result));
+  return text + surroundings + "\n" + stage_lines(s);
+}
+
+void StatusSurroundings::add(const bridge::msg::VoStatus&, Clock::time_point now) {
+  arrivals_.push_back(now);
+  while (now - arrivals_.front() > kRateWindow) arrivals_.pop_front();
+}
+
+void StatusSurroundings::add(const bridge::msg::ScaledOdometry& m) {
+  scale_ = {m.scale_valid, m.log_scale, m.log_scale_sigma, m.scale_age_s};
+}
+
+void StatusSurroundings::add(const bridge::msg::RecorderStatus& m, Clock::time_point now) {
+  Recorder recorder = {m.recording,
+                       text_or_dash(m.file),
+                       text_or_dash(m.reason),
+                       m.bytes,
+                       m.free_bytes,
+                       m.dropped,
+                       0.0,
+                       now};
+  if (recorder_ && recorder_->file == recorder.file && m.bytes >= recorder_->bytes) {
+    const double seconds = std::chrono::duration<double>(now - recorder_->heard).count();
+    if (seconds > 0.0) {
+      recorder.bytes_per_s = static_cast<double>(m.bytes - recorder_->bytes) / seconds;
+    }
+  }
+  recorder_ = std::move(recorder);
+}
+
+void StatusSurroundings::add(const bridge::msg::Clock& m, Clock::time_point now) {
+  clock_ = {bridge::stamp_ns(m.clock), now};
+}
+
+/// How old a stamp is: by the replay's clock while there is one.
+std::string StatusSurroundings::age(std::int64_t stamp_ns, Clock::time_point now,
+                                    std::int64_t utc_ns) const {
+  const bool replayed = clock_ && now - clock_->heard < kClockPatience;
+  const double seconds =
+      1e-9 * static_cast<double>((replayed ? clock_->time_ns : utc_ns) - stamp_ns);
+  if (replayed) return fmt::format("newest frame {:.2f} s old by /clock", seconds);
+  if (seconds > kOldestLive) return "frames of a recording";
+  return fmt::format("newest frame {:.2f} s old", seconds);
+}
+
+std::string StatusSurroundings::scale_text() const {
+  if (!scale_ || !scale_->valid) return "not measured";
+  return fmt::format("{:.4f} +- {:.2f} %, measured {:.1f} s ago", std::exp(scale_->log_scale),
+                     100 * scale_->sigma, scale_->age_s);
+}
+
+std::string StatusSurroundings::disk_text(Clock::time_point now) const {
+  if (!recorder_ || now - recorder_->heard > kRecorderPatience) return "no word of a recorder";
+  const Recorder& r = *recorder_;
+  const std::string left = fmt::format("{:.1f} GB free, {} dropped",
+                                       1e-9 * static_cast<double>(r.free_bytes), r.dropped);
+  if (!r.recording) return fmt::format("not recording ({}); {}", r.reason, left);
+  return fmt::format("recording {}, {:.1f} MB, {:.1f} MB/s; {}", r.file,
+                     1e-6 * static_cast<double>(r.bytes), 1e-6 * r.bytes_per_s, left);
+}
+
+std::string StatusSurroundings::text(const bridge::msg::VoStatus& status, Clock::time_point now,
+                                     std::int64_t utc_ns) const {
+  double rate = 0.0;
+  if (arrivals_.size() > 1) {
+    const std::chrono::duration<double> span = arrivals_.back() - arrivals_.front();
+    rate = static_cast<double>(arrivals_.size() - 1) / span.count();
+  }
+  return fmt::format("rate        {:.1f} Hz; {}\nscale       {}\ndisk        {}\n", rate,
+                     age(bridge::stamp_ns(status.header.stamp), now, utc_ns), scale_text(),
+                     disk_text(now));
 }
 
 StatusLine::StatusLine(Trajectory truth) : drift_(std::move(truth)) {}

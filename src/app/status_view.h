@@ -10,8 +10,50 @@
 
 namespace sovo::app {
 
-/// The state of the odometry process as a screen of text.
-std::string status_screen(const bridge::msg::VoStatus& status);
+/// What other topics add to the state of the odometry process.
+class StatusSurroundings {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  void add(const bridge::msg::VoStatus& status, Clock::time_point now);
+  void add(const bridge::msg::ScaledOdometry& odometry);
+  void add(const bridge::msg::RecorderStatus& recorder, Clock::time_point now);
+  void add(const bridge::msg::Clock& clock, Clock::time_point now);
+
+  /// Lines of text: rate, scale and disk. `utc_ns`: the time of day, which `/clock` stands in for
+  /// while a replay publishes it.
+  std::string text(const bridge::msg::VoStatus& status, Clock::time_point now,
+                   std::int64_t utc_ns) const;
+
+ private:
+  std::string age(std::int64_t stamp_ns, Clock::time_point now, std::int64_t utc_ns) const;
+  std::string scale_text() const;
+  std::string disk_text(Clock::time_point now) const;
+
+  struct Recorder {
+    bool recording = false;
+    std::string file, reason;
+    std::uint64_t bytes = 0, free_bytes = 0, dropped = 0;
+    double bytes_per_s = 0.0;
+    Clock::time_point heard;
+  };
+  struct ReplayClock {
+    std::int64_t time_ns = 0;
+    Clock::time_point heard;
+  };
+  struct Scale {
+    bool valid = false;
+    double log_scale = 0.0, sigma = 0.0, age_s = 0.0;
+  };
+
+  std::deque<Clock::time_point> arrivals_;  ///< Of the last seconds.
+  std::optional<Recorder> recorder_;
+  std::optional<ReplayClock> clock_;
+  std::optional<Scale> scale_;
+};
+
+/// The state of the odometry process as a screen of text; `surroundings`: lines of others.
+std::string status_screen(const bridge::msg::VoStatus& status, const std::string& surroundings);
 
 /// The state of the odometry process in one line: what came in over the bus so far.
 class StatusLine {

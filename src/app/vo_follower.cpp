@@ -9,24 +9,35 @@
 namespace sovo::app {
 namespace {
 
-constexpr std::uint64_t kMostAhead = 2;
+constexpr std::uint64_t kFramesAhead = 2;
 constexpr std::chrono::seconds kVoPatience(5);
 constexpr std::chrono::milliseconds kFollowSlice(50);
 
 }  // namespace
 
 Result<VoFollower> VoFollower::open(const bridge::Participant& participant, std::uint64_t session) {
+  using Number = std::optional<std::uint64_t>;
+  return open(
+      participant,
+      [session](const bridge::msg::VoStatus& status) {
+        return status.session == session ? Number(status.sequence) : std::nullopt;
+      },
+      kFramesAhead);
+}
+
+Result<VoFollower> VoFollower::open(const bridge::Participant& participant, Numbering numbering,
+                                    std::uint64_t ahead) {
   auto reader = bridge::Reader<bridge::msg::VoStatus>::open(participant, bridge::topics::kStatus,
                                                             bridge::topics::kStatusQos);
   if (!reader) return reader.failure();
-  return VoFollower(std::move(*reader), session);
+  return VoFollower(std::move(*reader), std::move(numbering), ahead);
 }
 
 bool VoFollower::update() {
   const auto before = done_;
   const auto taken = reader_.take_each([this](const bridge::msg::VoStatus& status, const auto&) {
-    if (status.session != session_) return;
-    done_ = std::max(done_.value_or(0), status.sequence);
+    const auto number = numbering_(status);
+    if (number) done_ = std::max(done_.value_or(0), *number);
   });
   if (!taken) spdlog::warn("{}", taken.error());
   return done_ != before;
@@ -34,9 +45,9 @@ bool VoFollower::update() {
 
 void VoFollower::wait_before(std::uint64_t sequence, const std::function<bool()>& stop) {
   if (update()) free_running_ = false;
-  if (sequence < kMostAhead || free_running_) return;
+  if (sequence < ahead_ || free_running_) return;
   auto last_progress = Clock::now();
-  while (!is_done(sequence - kMostAhead) && !stop()) {
+  while (!is_done(sequence - ahead_) && !stop()) {
     reader_.wait(kFollowSlice);
     if (update()) last_progress = Clock::now();
     if (Clock::now() - last_progress < kVoPatience) continue;

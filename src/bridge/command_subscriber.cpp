@@ -43,7 +43,7 @@ std::string refusal(const msg::VoCommand& m, bool accepts) {
 Result<CommandSubscriber> CommandSubscriber::open(const Participant& participant) {
   auto reader = Reader<msg::VoCommand>::open(participant, topics::kCommand, topics::kCommandQos);
   if (!reader) return reader.failure();
-  const bool accepts = participant.loopback_only() || participant.config().accept_commands;
+  const bool accepts = participant.accepts_commands();
   return CommandSubscriber(std::move(*reader), accepts);
 }
 

@@ -19,6 +19,16 @@ constexpr std::array<std::pair<RosGraph, const char*>, 3> enum_names(RosGraph) {
   return {{{RosGraph::kOff, "off"}, {RosGraph::kHumble, "humble"}, {RosGraph::kIronPlus, "iron+"}}};
 }
 
+/// How samples go from process to process on one machine.
+enum class Transport {
+  kUdp,
+  kShm,  ///< Shared memory of iceoryx, between camera and odometry.
+};
+
+constexpr std::array<std::pair<Transport, const char*>, 2> enum_names(Transport) {
+  return {{{Transport::kUdp, "udp"}, {Transport::kShm, "shm"}}};
+}
+
 struct RosConfig {
   RosGraph graph = RosGraph::kOff;
 
@@ -34,6 +44,8 @@ struct DdsConfig {
   std::string network = "lo";  ///< "lo", an interface or one of this machine's addresses.
   std::string ns = "sovo";     ///< Namespace of topics; another than "sovo" prefixes frames too.
   bool accept_commands = false;
+  std::string security;  ///< Folder with the keys of DDS Security; empty: none.
+  Transport transport = Transport::kUdp;
   RosConfig ros;
 
   template <class Visitor>
@@ -42,6 +54,8 @@ struct DdsConfig {
     v("network", network, "lo, an interface or an address of this machine");
     v("ns", ns, "namespace of topics; another than sovo prefixes frame names too");
     v("accept_commands", accept_commands, "obey commands that come over a network");
+    v("security", security, "folder with the keys of DDS Security (config/security); empty: none");
+    v("transport", transport, "udp, or shm: shared memory from camera to vo, needs iox-roudi");
     v("ros", ros, "what ROS 2 tools see");
   }
 };
@@ -61,6 +75,7 @@ struct NetworkPlan {
   std::uint32_t domain = 0;
   std::string xml;                 ///< Configuration for dds_create_domain.
   bool loopback_only = false;      ///< Nothing can come from another machine.
+  bool secured = false;            ///< Nothing can come from those who have no key.
   std::vector<std::string> notes;  ///< For the log at start: where it speaks, how to change that.
 };
 

@@ -1,76 +1,44 @@
 #include "sovo/bridge/mcap_source.h"
 
 #include <algorithm>
-
-#include "sovo/bridge/cdr_codec.h"
-#include "sovo/bridge/stereo_frame_conversion.h"
+#include <utility>
 
 namespace sovo::bridge {
-namespace {
 
-constexpr const char* kFrameType = MessageTraits<msg::StereoFrame>::kRosName;
-constexpr const char* kCalibrationType = MessageTraits<msg::StereoCalibration>::kRosName;
-
-bool is_of(const RecordedTopic& topic, const char* type) {
-  return topic.type == type && topic.messages > 0;
-}
-
-}  // namespace
-
-Result<std::unique_ptr<McapSource>> McapSource::open(const std::string& path,
-                                                     std::optional<StereoCameras> calibration,
-                                                     int start, int frames) {
-  auto recording = Recording::open(path);
+Result<std::unique_ptr<McapSource>> McapSource::open(const McapSourceConfig& config) {
+  auto recording = Recording::open(config.path);
   if (!recording) return recording.failure();
   std::unique_ptr<McapSource> source(new McapSource(std::move(*recording)));
-  source->path_ = path;
-  const RecordedTopic* topic = source->recording_->only_topic_of(kFrameType);
-  if (topic == nullptr || topic->messages == 0) {
-    return Error{path +
-                 " has no stereo frames, or those of more than one camera; it needs one "
-                 "topic of type " +
-                 kFrameType};
+  source->path_ = config.path;
+  auto frames = RecordedFrames::open(*source->recording_, config.topics);
+  if (!frames) return Error{config.path + ": " + frames.error()};
+  source->frames_ = std::move(*frames);
+  if (config.calibration) {
+    source->cameras_ = *config.calibration;
+  } else {
+    auto cameras = source->frames_->calibration();
+    if (!cameras) return Error{config.path + ": " + cameras.error()};
+    source->cameras_ = std::move(*cameras);
   }
-  if (calibration) {
-    source->cameras_ = std::move(*calibration);
-  } else if (auto found = source->find_calibration(); !found) {
-    return found.failure();
+  source->frames_->rewind();
+  std::size_t left_out = 0;
+  while (left_out < static_cast<std::size_t>(std::max(config.start, 0)) &&
+         source->frames_->next().state != SourceState::kEndOfStream) {
+    ++left_out;
   }
-  const auto skipped = static_cast<std::size_t>(std::max(start, 0));
-  const std::size_t there = topic->messages > skipped ? topic->messages - skipped : 0;
-  source->size_ =
-      frames > 0 ? std::min<std::size_t>(there, static_cast<std::size_t>(frames)) : there;
-  source->recording_->seek(0, [](const RecordedTopic& t) { return is_of(t, kFrameType); });
-  for (std::size_t i = 0; i < skipped && source->recording_->next(); ++i) continue;
+  source->size_ = source->frames_->size() - std::min(left_out, source->frames_->size());
+  if (config.frames > 0) {
+    source->size_ = std::min(source->size_, static_cast<std::size_t>(config.frames));
+  }
   return source;
-}
-
-Result<void> McapSource::find_calibration() {
-  recording_->seek(0, [](const RecordedTopic& t) { return is_of(t, kCalibrationType); });
-  const auto recorded = recording_->next();
-  if (!recorded) {
-    return Error{path_ + " has no calibration: it needs a topic of type " +
-                 std::string(kCalibrationType) + ", or give a file with --calib"};
-  }
-  const auto message = decode<msg::StereoCalibration>(recorded->data);
-  if (!message) return message.failure();
-  auto cameras = from_message(**message);
-  if (!cameras) return Error{path_ + ": calibration refused: " + cameras.error()};
-  cameras_ = std::move(*cameras);
-  return {};
 }
 
 SourceResult McapSource::next(std::chrono::milliseconds) {
   if (given_ >= size_) return {SourceState::kEndOfStream, {}, {}};
-  const auto recorded = recording_->next();
-  if (!recorded) return {SourceState::kEndOfStream, {}, {}};
-  ++given_;
-  const std::string where = path_ + ": frame " + std::to_string(given_) + " is refused: ";
-  const auto message = decode<msg::StereoFrame>(recorded->data);
-  if (!message) return {SourceState::kBadFrame, {}, where + message.error()};
-  auto frame = from_message(**message);
-  if (!frame) return {SourceState::kBadFrame, {}, where + frame.error()};
-  return {SourceState::kFrame, std::move(*frame), {}};
+  SourceResult result = frames_->next();
+  if (result.state == SourceState::kFrame) ++given_;
+  if (result.state == SourceState::kBadFrame) result.message = path_ + ": " + result.message;
+  return result;
 }
 
 }  // namespace sovo::bridge

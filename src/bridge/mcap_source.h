@@ -4,24 +4,31 @@
 #include <optional>
 #include <string>
 
-#include "sovo/bridge/calibration_conversion.h"
+#include "sovo/bridge/recorded_frames.h"
 #include "sovo/driver/frame_source.h"
 #include "sovo/io/recording.h"
 
 namespace sovo::bridge {
 
-/// Stereo frames of a recording: its StereoFrame topic, with the calibration of its
-/// StereoCalibration topic unless one is given.
+/// What is read of a recording.
+struct McapSourceConfig {
+  std::string path;
+  RecordedFramesConfig topics;
+  std::optional<StereoCameras> calibration;  ///< Instead of the recorded one.
+  int start = 0;                             ///< Frames left out at the beginning.
+  int frames = 0;                            ///< At most; 0: all.
+};
+
+/// Stereo frames of a recording: ours, or any ROS 2 bag with the images of two cameras.
 class McapSource : public FrameSource {
  public:
-  /// `start`: frames left out at the beginning; `frames`: at most, 0 for all.
-  static Result<std::unique_ptr<McapSource>> open(const std::string& path,
-                                                  std::optional<StereoCameras> calibration,
-                                                  int start, int frames);
+  static Result<std::unique_ptr<McapSource>> open(const McapSourceConfig& config);
 
   const StereoCameras& cameras() const { return cameras_; }
   const StereoRig& rig() const override { return cameras_.rig; }
   std::optional<std::size_t> size() const override { return size_; }
+  /// Topics that the frames come from.
+  std::string about() const { return frames_->about(); }
   /// Notes about the files, for the log.
   std::vector<std::string> notes() const { return recording_->notes(); }
 
@@ -30,9 +37,8 @@ class McapSource : public FrameSource {
  private:
   explicit McapSource(std::unique_ptr<Recording> recording) : recording_(std::move(recording)) {}
 
-  Result<void> find_calibration();
-
   std::unique_ptr<Recording> recording_;
+  std::unique_ptr<RecordedFrames> frames_;  // reads recording_
   std::string path_;
   StereoCameras cameras_;
   std::size_t size_ = 0;

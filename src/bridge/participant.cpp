@@ -1,7 +1,9 @@
 #include "sovo/bridge/participant.h"
 
+#include "sovo/bridge/dds_security.h"
 #include "sovo/bridge/ros_graph.h"
 #include "sovo/bridge/ros_names.h"
+#include "sovo/bridge/shared_memory.h"
 
 namespace sovo::bridge {
 namespace {
@@ -29,14 +31,22 @@ Result<Participant> Participant::open(const DdsConfig& config, const std::string
                                       const DdsEnvironment& environment) {
   auto plan = plan_network(config, environment);
   if (!plan) return plan.failure();
+  if (auto planned = plan_shared_memory(config, node, &*plan); !planned) return planned.failure();
+  const QosPtr qos(dds_create_qos());
+  if (!config.security.empty()) {
+    if (auto secured = secure(config.security, qos.get()); !secured) return secured.failure();
+    plan->secured = true;
+    plan->notes.push_back("DDS Security with the keys in " + config.security +
+                          ": nothing is exchanged with those who have none");
+  }
   auto domain = open_domain(*plan, config.network);
   if (!domain) return domain.failure();
 
-  const QosPtr qos(dds_create_qos());
   const std::string enclave = "enclave=/;";
   dds_qset_userdata(qos.get(), enclave.data(), enclave.size());
   auto entity = take_entity(dds_create_participant(plan->domain, qos.get(), nullptr),
-                            "cannot create a DDS participant on network '" + config.network + "'");
+                            "cannot create a DDS participant on network '" + config.network + "'" +
+                                (plan->secured ? " with the keys in " + config.security : ""));
   if (!entity) return entity.failure();
 
   Participant result;

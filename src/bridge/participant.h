@@ -34,8 +34,10 @@ class Participant {
   dds_entity_t entity() const { return participant_.get(); }
   std::uint32_t domain() const { return plan_.domain; }
   const DdsConfig& config() const { return config_; }
-  /// Nothing can come from another machine.
-  bool loopback_only() const { return plan_.loopback_only; }
+  /// Whether commands are obeyed: from this machine, by those who have a key, or as configured.
+  bool accepts_commands() const {
+    return plan_.loopback_only || plan_.secured || config_.accept_commands;
+  }
   /// Lines for the log at start.
   const std::vector<std::string>& notes() const { return plan_.notes; }
 

@@ -4,12 +4,10 @@
 #include <cctype>
 #include <ctime>
 #include <filesystem>
-#include <tuple>
 
 #include "sovo/bridge/borrow.h"
 #include "sovo/bridge/ros_conversion.h"
 #include "sovo/bridge/topics.h"
-#include "sovo/io/size.h"
 #include "sovo/io/text.h"
 
 namespace sovo::bridge {
@@ -44,50 +42,31 @@ std::vector<std::string> names_in(const std::string& topics) {
   return names;
 }
 
-Result<void> read_sizes(const RecorderConfig& config, RecordingConfig* file,
-                        std::uint64_t* queue_bytes) {
-  file->compression = config.compression;
-  const std::tuple<const char*, const std::string&, std::uint64_t*> sizes[] = {
-      {"split", config.split, &file->split_bytes},
-      {"min_free", config.min_free, &file->min_free_bytes},
-      {"chunk", config.chunk, &file->chunk_bytes},
-      {"queue", config.queue, queue_bytes}};
-  for (const auto& [key, text, bytes] : sizes) {
-    const auto size = parse_size(text);
-    if (!size) {
-      return Error{std::string("record.") + key + " is '" + excerpt(text) +
-                   "'; it must be a size as 500MB or 2GB"};
-    }
-    *bytes = *size;
-  }
-  return {};
-}
-
 }  // namespace
 
 Recorder::Recorder(const Participant& participant, const RecorderConfig& config,
-                   const RecordingConfig& file, std::uint64_t queue_bytes,
-                   Reader<msg::RecorderCommand> commands, Writer<msg::RecorderStatus> status)
+                   const RecorderSizes& sizes, Reader<msg::RecorderCommand> commands,
+                   Writer<msg::RecorderStatus> status)
     : config_(config),
-      file_(file),
-      accepts_(participant.loopback_only() || participant.config().accept_commands),
+      file_(sizes.file),
+      accepts_(participant.accepts_commands()),
       commands_(std::move(commands)),
       status_(std::move(status)),
-      thread_(queue_bytes) {}
+      thread_(sizes.queue_bytes,
+              config.ros_images ? participant.topic(topics::kStereo) : std::string()) {}
 
 Result<std::unique_ptr<Recorder>> Recorder::open(const Participant& participant,
                                                  const RecorderConfig& config) {
-  RecordingConfig file;
-  std::uint64_t queue_bytes = 0;
-  if (auto read = read_sizes(config, &file, &queue_bytes); !read) return read.failure();
+  const auto sizes = read_sizes(config);
+  if (!sizes) return sizes.failure();
   auto commands = Reader<msg::RecorderCommand>::open(participant, topics::kRecordCommand,
                                                      topics::kRecordCommandQos);
   if (!commands) return commands.failure();
   auto status = Writer<msg::RecorderStatus>::open(participant, topics::kRecordStatus,
                                                   topics::kRecordStatusQos);
   if (!status) return status.failure();
-  std::unique_ptr<Recorder> recorder(new Recorder(participant, config, file, queue_bytes,
-                                                  std::move(*commands), std::move(*status)));
+  std::unique_ptr<Recorder> recorder(
+      new Recorder(participant, config, *sizes, std::move(*commands), std::move(*status)));
   auto capture =
       TopicCapture::open(participant, names_in(config.topics),
                          [raw = recorder.get()](const std::shared_ptr<const CapturedTopic>& topic,

@@ -38,8 +38,7 @@ class Recorder {
   std::string failure() const { return capture_->failure(); }
 
  private:
-  Recorder(const Participant& participant, const RecorderConfig& config,
-           const RecordingConfig& file, std::uint64_t queue_bytes,
+  Recorder(const Participant& participant, const RecorderConfig& config, const RecorderSizes& sizes,
            Reader<msg::RecorderCommand> commands, Writer<msg::RecorderStatus> status);
 
   /// `name`: beside the configured path; empty: the path itself, or one by date and time.

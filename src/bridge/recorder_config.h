@@ -3,6 +3,7 @@
 #include <string>
 
 #include "sovo/io/recording_config.h"
+#include "sovo/io/result.h"
 
 namespace sovo::bridge {
 
@@ -11,6 +12,7 @@ struct RecorderConfig {
   std::string out = "recording";
   std::string topics;
   bool wait = false;
+  bool ros_images = false;
   std::string split = "0";
   std::string min_free = "1GB";
   std::string queue = "256MB";
@@ -22,6 +24,7 @@ struct RecorderConfig {
     v("out", out, "folder of the recording, or a file that ends in .mcap");
     v("topics", topics, "topics beside the default set, with commas; all: every known type");
     v("wait", wait, "begin when record_command says so");
+    v("ros_images", ros_images, "write stereo frames as Image and CameraInfo");
     v("split", split, "a file is followed by another beyond this size; 0: never");
     v("min_free", min_free, "recording ends when the disk has less left");
     v("queue", queue, "what may wait for the disk; beyond, messages are dropped and counted");
@@ -29,5 +32,14 @@ struct RecorderConfig {
     v("compression", compression, "of the chunks");
   }
 };
+
+/// The sizes that the texts of a configuration say.
+struct RecorderSizes {
+  RecordingConfig file;
+  std::uint64_t queue_bytes = 0;
+};
+
+/// The error names the key that is no size.
+Result<RecorderSizes> read_sizes(const RecorderConfig& config);
 
 }  // namespace sovo::bridge

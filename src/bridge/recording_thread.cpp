@@ -19,7 +19,10 @@ bool is(const CapturedTopic& topic, const char* type) { return topic.about.type 
 
 }  // namespace
 
-RecordingThread::RecordingThread(std::uint64_t queue_bytes) : queue_bytes_(queue_bytes) {}
+RecordingThread::RecordingThread(std::uint64_t queue_bytes, const std::string& stereo_topic)
+    : queue_bytes_(queue_bytes) {
+  if (!stereo_topic.empty()) converter_ = std::make_unique<RosImageConverter>(stereo_topic);
+}
 
 RecordingThread::~RecordingThread() { stop("the recorder ended"); }
 
@@ -33,7 +36,6 @@ Result<void> RecordingThread::start(const std::string& path, const RecordingConf
     return writer.failure();
   }
   writer_ = std::move(*writer);
-  topics_.clear();
   has_calibration_ = false;
   gaps_.clear();
   queue_.clear();
@@ -148,15 +150,41 @@ Result<void> RecordingThread::work(std::deque<Item> items) {
 
 Result<void> RecordingThread::write(const Item& item) {
   if (!has_calibration_) attach_calibration(item);
-  auto topic = topics_.find(item.topic);
-  if (topic == topics_.end()) {
-    topic = topics_.emplace(item.topic, writer_->add_topic(item.topic->about)).first;
+  const std::string& name = item.topic->about.topic;
+  if (converter_) {
+    if (name == converter_->stereo_topic()) return write_images(item);
+    if (converter_->makes(name)) return {};  // once is enough
+    if (is(*item.topic, MessageTraits<msg::StereoCalibration>::kRosName)) {
+      (void)converter_->take_calibration(item.sample.bytes());  // a bad one gives no camera_info
+    }
   }
-  auto done = writer_->write(topic->second, static_cast<std::uint64_t>(item.log_ns),
-                             static_cast<std::uint64_t>(item.sample.source_stamp_ns()),
-                             item.sample.bytes());
+  return write_as(item.topic->about, item, item.sample.bytes());
+}
+
+Result<void> RecordingThread::write_as(const RecordingTopic& topic, const Item& item,
+                                       CdrBytes bytes) {
+  auto done = writer_->write(writer_->topic_number(topic), static_cast<std::uint64_t>(item.log_ns),
+                             static_cast<std::uint64_t>(item.sample.source_stamp_ns()), bytes);
   if (!done) return done;
   return writer_->tick();
+}
+
+Result<void> RecordingThread::write_images(const Item& item) {
+  const auto messages = converter_->convert(item.sample.bytes());
+  if (!messages) {
+    count_drop(item.topic->about.topic);
+    return {};
+  }
+  for (const auto& message : *messages) {
+    if (auto done = write_as(*message.topic, item, message.data); !done) return done;
+  }
+  return {};
+}
+
+void RecordingThread::count_drop(const std::string& topic) {
+  const std::lock_guard lock(mutex_);
+  ++state_.drops[topic];
+  ++state_.dropped;
 }
 
 /// The first calibration is attached in the form of a calibration file.

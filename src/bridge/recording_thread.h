@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "sovo/bridge/cdr_sample.h"
+#include "sovo/bridge/ros_image_converter.h"
 #include "sovo/bridge/session_lock.h"
 #include "sovo/bridge/topic_capture.h"
 #include "sovo/io/recording_writer.h"
@@ -35,7 +36,8 @@ struct RecordingState {
 class RecordingThread {
  public:
   /// `queue_bytes`: what may wait; beyond, messages are dropped and counted.
-  explicit RecordingThread(std::uint64_t queue_bytes);
+  /// `stereo_topic`: its frames are written as Image and CameraInfo; empty: as they are.
+  explicit RecordingThread(std::uint64_t queue_bytes, const std::string& stereo_topic = {});
   ~RecordingThread();
 
   /// Begins a recording; messages pushed from now on are in it, after those of latched topics that
@@ -60,6 +62,9 @@ class RecordingThread {
   void queue_latched();
   void run();
   Result<void> write(const Item& item);
+  Result<void> write_as(const RecordingTopic& topic, const Item& item, CdrBytes bytes);
+  Result<void> write_images(const Item& item);
+  void count_drop(const std::string& topic);
   Result<void> work(std::deque<Item> items);
   void attach_calibration(const Item& item);
   void count_gaps(const std::string& topic, CdrBytes frame);
@@ -79,7 +84,7 @@ class RecordingThread {
 
   // Of the writing thread while it runs.
   std::unique_ptr<RecordingWriter> writer_;
-  std::map<std::shared_ptr<const CapturedTopic>, std::size_t> topics_;
+  std::unique_ptr<RosImageConverter> converter_;  // null: frames are written as they are
   bool has_calibration_ = false;
   std::thread thread_;
 };

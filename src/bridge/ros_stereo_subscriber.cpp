@@ -6,6 +6,7 @@
 
 #include "sovo/bridge/borrow.h"
 #include "sovo/bridge/camera_info_conversion.h"
+#include "sovo/bridge/image_topics.h"
 #include "sovo/bridge/ros_conversion.h"
 #include "sovo/bridge/stereo_frame_conversion.h"
 #include "sovo/bridge/topics.h"
@@ -19,17 +20,6 @@ constexpr auto kPairPoll = 2ms;  // of the other side and of calibrations
 constexpr std::size_t kMostReasons = 64;
 constexpr std::size_t kMostPairReports = 16;
 constexpr std::int64_t kHistoryNs = 10'000'000'000;  // older stamps are those of a recording
-
-/// "camera_info" beside an image topic.
-std::string info_topic(const std::string& image_topic) {
-  const auto slash = image_topic.rfind('/');
-  return slash == std::string::npos ? "camera_info"
-                                    : image_topic.substr(0, slash + 1) + "camera_info";
-}
-
-bool is_rectified(const std::string& image_topic) {
-  return image_topic.substr(image_topic.rfind('/') + 1).find("rect") != std::string::npos;
-}
 
 }  // namespace
 
@@ -51,7 +41,7 @@ RosStereoSubscriber::RosStereoSubscriber(const Participant& participant,
 
 Result<void> RosStereoSubscriber::open_side(bool is_left) {
   const std::string& topic = is_left ? config_.left : config_.right;
-  if (topic.ends_with("/compressed")) {
+  if (is_compressed(topic)) {
     return Error{topic + " has compressed images; give the topic of the images themselves"};
   }
   auto images = Reader<msg::Image>::open(participant_, topic, topics::kImageQos);
@@ -202,7 +192,7 @@ void RosStereoSubscriber::take_calibration() {
   std::optional<StereoCameras> cameras;
   if (missing.empty()) {
     auto made = cameras_from(*left_->info, *right_->info,
-                             is_rectified(left_->topic) && is_rectified(right_->topic));
+                             ImageTopics{left_->topic, right_->topic}.rectified());
     if (made) {
       cameras = std::move(*made);
     } else {

@@ -53,7 +53,7 @@ std::optional<StereoFrame> StereoPairing::next() {
     left_.pop_front();
     return alone;
   }
-  if (left_.size() < kMostWaiting) return std::nullopt;
+  if (left_.empty() || (left_.size() < kMostWaiting && !ended_)) return std::nullopt;
   ++unpaired_;
   StereoFrame alone = make_frame(std::move(left_.front()), std::nullopt);
   left_.pop_front();

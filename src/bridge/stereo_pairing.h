@@ -29,6 +29,9 @@ class StereoPairing {
   /// partner did not come while three later ones did is given alone, with the right side missing.
   std::optional<StereoFrame> next();
 
+  /// No image will follow: `next` gives those that wait.
+  void end() { ended_ = true; }
+
   /// Forgets the images that wait: another publisher begins.
   void clear();
 
@@ -45,6 +48,7 @@ class StereoPairing {
   std::deque<Image> left_;
   std::deque<Image> right_;
   std::uint64_t unpaired_ = 0;
+  bool ended_ = false;
 };
 
 }  // namespace sovo::bridge

@@ -5,7 +5,7 @@
 #include <chrono>
 #include <exception>
 
-#include "sovo/bridge/offered_qos.h"
+#include "sovo/bridge/recording_topics.h"
 #include "sovo/bridge/topic_catalog.h"
 #include "sovo/bridge/topics.h"
 
@@ -81,8 +81,7 @@ Result<void> TopicCapture::add(const std::string& ros_name, const MessageSchema&
   if (source.condition.get() > 0) dds_waitset_detach(waitset_.get(), source.condition.get());
   source.condition.reset();
   source.reader.reset();
-  const RecordingTopic about = {ros_name, schema.ros_name, schema.definition, schema.type_hash,
-                                offered_qos_text(qos)};
+  const RecordingTopic about = recording_topic(ros_name, schema, qos);
   source.topic = std::make_shared<const CapturedTopic>(CapturedTopic{about, &schema, qos});
   auto reader = RawReader::open(participant_, ros_name, schema, reader_side(qos));
   if (!reader) return reader.failure();

@@ -6,6 +6,7 @@
 
 #include "sovo/io/mcap_reader.h"
 #include "sovo/io/mcap_writer.h"
+#include "sovo/io/recording.h"
 
 namespace sovo {
 namespace {
@@ -20,8 +21,10 @@ Result<std::uint64_t> copy_all(McapReader& from, McapWriter* to) {
     auto done = to->attach(attachment.name, attachment.media_type, attachment.log_ns, *data);
     if (!done) return done.failure();
   }
-  if (const auto drops = from.metadata("sovo_drops")) {
-    if (auto done = to->add_metadata("sovo_drops", *drops); !done) return done.failure();
+  for (const char* name : {kRepeatedRecord, "sovo_drops"}) {
+    const auto values = from.metadata(name);
+    if (!values) continue;
+    if (auto done = to->add_metadata(name, *values); !done) return done.failure();
   }
   std::map<std::uint16_t, std::uint16_t> schemas;
   std::map<std::uint16_t, std::uint16_t> channels;

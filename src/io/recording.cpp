@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <system_error>
 
+#include "sovo/io/text.h"
+
 namespace sovo {
 namespace {
 
@@ -61,8 +63,36 @@ Result<std::unique_ptr<Recording>> Recording::open(const std::string& path) {
                    [](const auto& a, const auto& b) {
                      return a->statistics().start_ns < b->statistics().start_ns;
                    });
+  recording->find_repeated();
   recording->seek(0);
   return recording;
+}
+
+void Recording::find_repeated() {
+  repeated_.resize(files_.size());
+  for (std::size_t i = 1; i < files_.size(); ++i) {
+    const auto counts = files_[i]->metadata(kRepeatedRecord);
+    if (!counts) continue;
+    for (const auto& [name, text] : *counts) {
+      const auto topic = topics_.find(name);
+      const auto count = parse_integer(text);
+      if (topic == topics_.end() || !count || *count <= 0) continue;
+      const std::uint64_t most =
+          std::min(static_cast<std::uint64_t>(*count), topic->second.messages);
+      repeated_[i][name] = most;
+      topic->second.messages -= most;
+      topic->second.repeated += most;
+      messages_ -= std::min(messages_, most);
+    }
+  }
+}
+
+/// Whether the next message of the topic in the current file is one of an earlier file.
+bool Recording::is_repeated(const std::string& topic) {
+  const auto left = still_repeated_[file_].find(topic);
+  if (left == still_repeated_[file_].end() || left->second == 0) return false;
+  --left->second;
+  return true;
 }
 
 void Recording::add(std::unique_ptr<McapReader> file) {
@@ -120,6 +150,10 @@ std::vector<std::string> Recording::notes() const {
 
 void Recording::seek(std::uint64_t log_ns, const TopicFilter& filter) {
   file_ = 0;
+  still_repeated_ = repeated_;
+  for (std::size_t i = 0; i < files_.size(); ++i) {
+    if (log_ns > files_[i]->statistics().start_ns) still_repeated_[i].clear();
+  }
   for (const auto& file : files_) {
     file->seek(log_ns, [this, filter](const mcap::Channel& channel) {
       const RecordedTopic* topic = find(channel.topic);
@@ -129,9 +163,13 @@ void Recording::seek(std::uint64_t log_ns, const TopicFilter& filter) {
 }
 
 std::optional<RecordedMessage> Recording::next() {
-  for (; file_ < files_.size(); ++file_) {
+  while (file_ < files_.size()) {
     const auto message = files_[file_]->next();
-    if (!message) continue;
+    if (!message) {
+      ++file_;
+      continue;
+    }
+    if (is_repeated(message->channel->topic)) continue;
     return RecordedMessage{find(message->channel->topic), message->log_ns, message->publish_ns,
                            message->data};
   }

@@ -11,14 +11,18 @@
 
 namespace sovo {
 
+/// Metadata record with the number of messages, by topic, that a file repeats of those before it.
+inline constexpr char kRepeatedRecord[] = "sovo_repeated";
+
 /// A channel of a recording: topic, type and quality of service as they were.
 struct RecordedTopic {
   std::string topic;  ///< Full ROS name.
   std::string type;   ///< "nav_msgs/msg/Odometry"
   std::string definition;
-  std::string type_hash;    ///< Empty when it was not recorded.
-  std::string offered_qos;  ///< YAML of ROS 2's bags; empty when it was not recorded.
-  std::uint64_t messages = 0;
+  std::string type_hash;       ///< Empty when it was not recorded.
+  std::string offered_qos;     ///< YAML of ROS 2's bags; empty when it was not recorded.
+  std::uint64_t messages = 0;  ///< Without those that are repeated.
+  std::uint64_t repeated = 0;  ///< Again in a further file, so that it stands alone.
 };
 
 struct RecordedMessage {
@@ -33,7 +37,8 @@ struct RecordedMessage {
 ///     auto recording = Recording::open("dive");
 ///     while (auto message = (*recording)->next()) { ... }
 ///
-/// Messages that are not CDR of a "ros2msg" type are left out and noted.
+/// What a file repeats of those before it (see RecordingWriter) is given once. Messages that are
+/// not CDR of a "ros2msg" type are left out and noted.
 class Recording {
  public:
   static Result<std::unique_ptr<Recording>> open(const std::string& path);
@@ -62,6 +67,8 @@ class Recording {
   Recording() = default;
   void add(std::unique_ptr<McapReader> file);
   void add_topic(const McapReader& file, const mcap::Channel& channel);
+  void find_repeated();
+  bool is_repeated(const std::string& topic);
 
   std::vector<std::unique_ptr<McapReader>> files_;
   std::map<std::string, RecordedTopic> topics_;
@@ -70,6 +77,9 @@ class Recording {
   std::uint64_t start_ns_ = 0;
   std::uint64_t end_ns_ = 0;
   std::size_t file_ = 0;
+  using Counts = std::map<std::string, std::uint64_t>;  // by topic
+  std::vector<Counts> repeated_;                        // by file
+  std::vector<Counts> still_repeated_;                  // and not yet passed
 };
 
 /// Paths of the MCAP files of a recording, in order: the file itself, or those of the folder.

@@ -61,6 +61,7 @@ Result<void> RecordingWriter::open_file() {
   auto writer = McapWriter::create(file_path_, config);
   if (!writer) return writer.failure();
   writer_ = std::move(*writer);
+  repeated_bytes_ = 0;
   schemas_.clear();
   stored_drops_.clear();
   for (Topic& topic : topics_) topic.channel.reset();
@@ -71,8 +72,44 @@ Result<void> RecordingWriter::open_file() {
 }
 
 std::size_t RecordingWriter::add_topic(const RecordingTopic& topic) {
-  topics_.push_back({topic, std::nullopt, 0, 0});
+  topics_.push_back({topic, std::nullopt, 0, 0, 0, {}});
   return topics_.size() - 1;
+}
+
+std::size_t RecordingWriter::topic_number(const RecordingTopic& topic) {
+  const auto found = std::find_if(topics_.begin(), topics_.end(), [&topic](const Topic& known) {
+    return known.about.topic == topic.topic && known.about.type == topic.type;
+  });
+  if (found == topics_.end()) return add_topic(topic);
+  return static_cast<std::size_t>(found - topics_.begin());
+}
+
+Result<void> RecordingWriter::split(std::uint64_t log_ns) {
+  if (auto done = close_file(); !done) return done;
+  if (auto done = open_file(); !done) return done;
+  if (auto done = repeat_latched(log_ns); !done) return done;
+  return write_metadata();
+}
+
+/// Gives the file what late readers would have got before its first message.
+Result<void> RecordingWriter::repeat_latched(std::uint64_t log_ns) {
+  std::map<std::string, std::string> counts;
+  for (const Topic& topic : topics_) {
+    if (!topic.latched.empty()) counts[topic.about.topic] = std::to_string(topic.latched.size());
+  }
+  if (counts.empty()) return {};
+  if (auto done = writer_->add_metadata(kRepeatedRecord, counts); !done) return done;
+  const std::uint64_t before = writer_->bytes();
+  for (Topic& topic : topics_) {
+    topic.repeated += topic.latched.size();
+    for (const Latched& message : topic.latched) {
+      auto done = writer_->write(channel_of(topic), message.sequence, log_ns, message.publish_ns,
+                                 message.data);
+      if (!done) return done;
+    }
+  }
+  repeated_bytes_ = writer_->bytes() - before;
+  return {};
 }
 
 std::uint16_t RecordingWriter::channel_of(Topic& topic) {
@@ -92,15 +129,17 @@ std::uint16_t RecordingWriter::channel_of(Topic& topic) {
 Result<void> RecordingWriter::write(std::size_t index, std::uint64_t log_ns,
                                     std::uint64_t publish_ns, ByteSpan data) {
   if (!writer_) return Error{path_ + " is closed"};
-  const std::uint64_t split = config_.split_bytes;
-  if (is_folder_ && split > 0 && writer_->bytes() >= split && messages() > 0) {
-    if (auto done = close_file(); !done) return done;
-    if (auto done = open_file(); !done) return done;
-    if (auto done = write_metadata(); !done) return done;
+  const std::uint64_t most = config_.split_bytes;
+  if (is_folder_ && most > 0 && writer_->bytes() >= most + repeated_bytes_ && messages() > 0) {
+    if (auto done = split(log_ns); !done) return done;
   }
   Topic& topic = topics_[index];
   auto done = writer_->write(channel_of(topic), topic.sequence, log_ns, publish_ns, data);
   if (!done) return done;
+  if (is_folder_ && most > 0 && topic.about.latched > 0) {
+    topic.latched.push_back({topic.sequence, publish_ns, Bytes(data.begin(), data.end())});
+    if (topic.latched.size() > topic.about.latched) topic.latched.pop_front();
+  }
   ++topic.sequence;
   ++topic.messages;
   return {};
@@ -176,8 +215,8 @@ Result<void> RecordingWriter::write_metadata() const {
   BagMetadata metadata;
   for (const Topic& topic : topics_) {
     if (topic.messages == 0) continue;
-    metadata.topics.push_back(
-        {topic.about.topic, topic.about.type, topic.about.offered_qos, topic.messages});
+    metadata.topics.push_back({topic.about.topic, topic.about.type, topic.about.offered_qos,
+                               topic.messages + topic.repeated});
   }
   for (const File& file : files_) {
     metadata.files.push_back(
@@ -192,7 +231,8 @@ Result<void> write_bag_metadata(const std::string& folder) {
   if (!recording) return recording.failure();
   BagMetadata metadata;
   for (const auto& [name, topic] : (*recording)->topics()) {
-    metadata.topics.push_back({name, topic.type, topic.offered_qos, topic.messages});
+    metadata.topics.push_back(
+        {name, topic.type, topic.offered_qos, topic.messages + topic.repeated});
   }
   for (const auto& file : (*recording)->files()) {
     metadata.files.push_back({fs::path(file->path()).filename().string(),

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <optional>
@@ -20,10 +21,15 @@ struct RecordingTopic {
   std::string definition;
   std::string type_hash;
   std::string offered_qos;  ///< YAML as ROS 2's bags have it.
+  /// Messages that a late reader would get; they are repeated at the start of every further file.
+  std::size_t latched = 0;
 };
 
 /// Writes a recording: "x.mcap" is that file alone; another path becomes a folder with
 /// PATH/NAME_0.mcap, further files, and metadata.yaml, which opens as a ROS 2 bag.
+///
+/// Each file stands alone: it begins with attachments and with what late readers of latched topics
+/// would get. The metadata record `sovo_repeated` counts those by topic.
 ///
 /// Everything older than a second is in a closed chunk on its way to the disk, given that `tick` is
 /// called often. For one thread.
@@ -34,6 +40,8 @@ class RecordingWriter {
 
   /// Number of the topic for `write`.
   std::size_t add_topic(const RecordingTopic& topic);
+  /// That of the topic of this name, added when it is new.
+  std::size_t topic_number(const RecordingTopic& topic);
   Result<void> write(std::size_t topic, std::uint64_t log_ns, std::uint64_t publish_ns,
                      ByteSpan data);
   /// To be stored in every file from now on.
@@ -66,14 +74,23 @@ class RecordingWriter {
     std::uint64_t log_ns = 0;
     Bytes data;
   };
+  struct Latched {
+    std::uint32_t sequence = 0;
+    std::uint64_t publish_ns = 0;
+    Bytes data;
+  };
   struct Topic {
     RecordingTopic about;
     std::optional<std::uint16_t> channel;  ///< In the file that is written now.
     std::uint32_t sequence = 0;
     std::uint64_t messages = 0;
+    std::uint64_t repeated = 0;
+    std::deque<Latched> latched;
   };
 
   Result<void> open_file();
+  Result<void> split(std::uint64_t log_ns);
+  Result<void> repeat_latched(std::uint64_t log_ns);
   Result<void> close_file();
   Result<void> store_drops();
   std::uint16_t channel_of(Topic& topic);
@@ -87,7 +104,8 @@ class RecordingWriter {
   std::map<std::string, std::uint16_t> schemas_;  // of the file that is written now
   std::vector<Topic> topics_;
   std::vector<Attachment> attachments_;
-  std::vector<File> files_;  // those that are closed
+  std::vector<File> files_;           // those that are closed
+  std::uint64_t repeated_bytes_ = 0;  // of the file that is written now
   std::map<std::string, std::uint64_t> drops_;
   std::map<std::string, std::uint64_t> stored_drops_;
   std::chrono::steady_clock::time_point last_flush_ = std::chrono::steady_clock::now();

@@ -7,8 +7,9 @@ import subprocess
 import time
 
 import harness
+import mcap_bag
 from bus_test import FRAMES, BusTest
-from harness import BAD_INPUT, DATASET, FAILED, OK, ROOT, USAGE, sovo
+from harness import BAD_INPUT, DATASET, FAILED, OK, ROOT, SOVO, USAGE, sovo
 
 
 class RecordTest(BusTest):
@@ -81,6 +82,71 @@ class Recordings(RecordTest):
         _, log = self.finish(recorder, FAILED)
         self.assertIn("less than", log)
         self.assertIn("--min-free", log)
+
+
+class RecordedRosImages(RecordTest):
+    def test_images_are_recorded_in_place_of_frames(self):
+        self.dive = self.folder / "images.mcap"
+        self.record_dataset("--ros-images", "--topics", "left/image_raw", "--compression", "none")
+        messages = mcap_bag.read_messages(self.dive)
+        name = "/" + self.bus[-1] + "/"
+        for side in ("left/", "right/"):
+            images = [m for m in messages if m.topic == name + side + "image_raw"]
+            infos = [m for m in messages if m.topic == name + side + "camera_info"]
+            self.assertEqual(len(images), FRAMES)
+            # The calibration may be heard a little later than the first frame.
+            stamps = [m.data[4:12] for m in images]
+            self.assertGreater(len(infos), FRAMES // 2)
+            self.assertEqual([m.data[4:12] for m in infos], stamps[FRAMES - len(infos):])
+        self.assertNotIn(name + "stereo", {m.topic for m in messages})
+        self.assertEqual(self.run_on("--mcap", self.dive),
+                         self.run_on("--dataset", DATASET))
+
+
+class FullDisk(RecordTest):
+    """A disk of 3 MB, which is a tmpfs of a mount namespace."""
+
+    def setUp(self):
+        super().setUp()
+        disk = self.folder / "disk"
+        disk.mkdir()
+        process = subprocess.Popen(
+            ["unshare", "-m", "sh", "-c", f"mount -t tmpfs -o size=3m none {disk} && echo up && "
+             "exec sleep 600"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(self.end, process)
+        if not process.stdout.readline():
+            self.skipTest("no small disk can be made here: " + process.stderr.read().strip())
+        self.on_disk = ["nsenter", "-t", str(process.pid), "-m", SOVO]
+        self.dive = disk / "dive"
+
+    def test_everything_before_is_readable_and_the_odometry_goes_on(self):
+        words = [*self.on_disk, "record", "-o", self.dive, "--min-free", "0", "--compression",
+                 "none", "--set", "record.chunk=500kB", *self.bus]
+        recorder = subprocess.Popen(list(map(str, words)), stdout=subprocess.PIPE,
+                                    stderr=subprocess.PIPE, text=True)
+        self.addCleanup(self.end, recorder)
+        self.wait_for_line(recorder.stderr, "recording to")
+        states = self.start("topic", "echo", "record_status", "--json")
+        vo = self.start("vo", "--frames", FRAMES)
+        self.expect(self.camera("--rate", "max"), OK)
+        _, log = self.finish(vo)
+        self.assertIn(f"received {FRAMES} frames; lost in transport 0, dropped 0", log)
+        _, log = self.finish(recorder, FAILED)
+        self.assertIn("No space left", log)
+        states.send_signal(signal.SIGINT)
+        heard = [json.loads(line) for line in self.finish(states)[0].splitlines()]
+        self.assertFalse(heard[-1]["recording"])
+        self.assertIn("No space left", heard[-1]["reason"])
+        out = self.folder / "out.txt"
+        read = subprocess.run([*self.on_disk, "run", "--mcap", str(self.dive), "--out", str(out)],
+                              capture_output=True, text=True, timeout=300, check=False)
+        self.expect(read, OK)
+        self.assertGreater(len(harness.read_tum(out)), 3)
+        subprocess.run([*self.on_disk, "recover", str(self.dive)], capture_output=True, timeout=60,
+                       check=False)  # there is no room for it, and nothing is lost by trying
+        again = subprocess.run([*self.on_disk, "run", "--mcap", str(self.dive)],
+                               capture_output=True, text=True, timeout=300, check=False)
+        self.expect(again, OK)
 
 
 class ReplayTests(RecordTest):

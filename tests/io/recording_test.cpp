@@ -98,6 +98,49 @@ TEST_F(RecordingTest, AFolderIsSplitAndOpensAsABag) {
   EXPECT_EQ(topic["message_count"].as<int>(), 25);
 }
 
+TEST_F(RecordingTest, EveryFileBeginsWithWhatLateReadersNeed) {
+  config_.split_bytes = 4000;
+  auto writer = RecordingWriter::create(path("dive"), config_);
+  ASSERT_TRUE(writer.ok()) << writer.error();
+  const auto map = (*writer)->add_topic({"/map", "p/msg/Map", "text", "", "", 2});
+  const auto frame = (*writer)->add_topic({"/frame", "p/msg/Frame", "text", "", ""});
+  for (std::uint8_t i = 0; i < 4; ++i) {
+    ASSERT_TRUE((*writer)->write(map, 100, 10, Bytes(50, i)).ok());
+  }
+  for (std::uint64_t i = 0; i < 50; ++i) {
+    ASSERT_TRUE((*writer)->write(frame, 110 + i, 100 + i, Bytes(200, 9)).ok());
+  }
+  ASSERT_TRUE((*writer)->close().ok());
+
+  auto recording = Recording::open(path("dive"));
+  ASSERT_TRUE(recording.ok()) << recording.error();
+  const std::size_t files = (*recording)->files().size();
+  ASSERT_GT(files, 2U);
+  EXPECT_EQ((*recording)->messages(), 54U);
+  EXPECT_EQ((*recording)->find("/map")->messages, 4U);
+  EXPECT_EQ((*recording)->find("/map")->repeated, 2 * (files - 1));
+  std::uint64_t read = 0;
+  while ((*recording)->next()) ++read;
+  EXPECT_EQ(read, 54U);
+
+  for (std::size_t i = 1; i < files; ++i) {
+    auto alone = Recording::open((*recording)->files()[i]->path());
+    ASSERT_TRUE(alone.ok()) << alone.error();
+    for (const int value : {2, 3}) {
+      const auto message = (*alone)->next();
+      ASSERT_TRUE(message.has_value());
+      EXPECT_EQ(message->topic->topic, "/map");
+      EXPECT_EQ(int{message->data.front()}, value);
+      EXPECT_EQ(message->publish_ns, 10U);
+    }
+  }
+  // Messages after the first file's are all there when it begins later.
+  (*recording)->seek(115);
+  std::uint64_t later = 0;
+  while ((*recording)->next()) ++later;
+  EXPECT_EQ(later, 45U);
+}
+
 TEST_F(RecordingTest, OneFileAndDropsInIt) {
   write("one.mcap", true);
   EXPECT_EQ(count("one.mcap"), 50U);

@@ -38,6 +38,7 @@ int run(int argc, char** argv) {
   add_replay_command(root);
   add_recover_command(root);
   add_replay_test_command(root);
+  add_report_command(root);
   add_eval_command(root);
   add_bench_command(root);
   add_calib_command(root);

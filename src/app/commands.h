@@ -19,6 +19,7 @@ void add_record_command(const Command& program);
 void add_recover_command(const Command& program);
 void add_replay_command(const Command& program);
 void add_replay_test_command(const Command& program);
+void add_report_command(const Command& program);
 void add_run_command(const Command& program);
 void add_status_command(const Command& program);
 void add_topic_command(const Command& program);

@@ -39,6 +39,7 @@ int run(int argc, char** argv) {
   add_recover_command(root);
   add_convert_command(root);
   add_replay_test_command(root);
+  add_report_command(root);
   add_eval_command(root);
   add_bench_command(root);
   add_calib_command(root);

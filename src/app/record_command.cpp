@@ -110,8 +110,8 @@ void add_record_command(const Command& program) {
   auto options = std::make_shared<ConfigOptions>(command);
   options->value("-o,--out", "record.out", "Folder of the recording, or one file", "DIR|X.mcap")
       .flag("--ros-images", "record.ros_images", "Write stereo frames as Image and CameraInfo")
-      .value("--topics", "record.topics", "Topics beside the default set; all: every known type",
-             "A,B")
+      .value("--topics", "record.topics",
+             "Topics beside the default set; all: every known type; -A: not that one", "A,B")
       .value("--split", "record.split", "Begin another file beyond this size", "SIZE")
       .value("--min-free", "record.min_free", "End when the disk has less left", "SIZE")
       .value("--compression", "record.compression", "Of the chunks", "none|lz4|zstd")

@@ -32,6 +32,10 @@ class Decoder {
       for (auto& element : value) read(element);
     } else if constexpr (std::is_same_v<T, char*>) {
       value = const_cast<char*>(text());
+    } else if constexpr (std::is_same_v<T, bool>) {
+      std::uint8_t byte = 0;  // any byte may come, and not every one is a bool
+      number(&byte, 1, 1);
+      value = byte != 0;
     } else {
       number(&value, sizeof(T), 1);
     }

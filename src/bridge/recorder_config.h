@@ -22,7 +22,8 @@ struct RecorderConfig {
   template <class Visitor>
   void visit(Visitor& v) {
     v("out", out, "folder of the recording, or a file that ends in .mcap");
-    v("topics", topics, "topics beside the default set, with commas; all: every known type");
+    v("topics", topics,
+      "topics beside the default set, with commas; all: every known type; -NAME: not it");
     v("wait", wait, "begin when record_command says so");
     v("ros_images", ros_images, "write stereo frames as Image and CameraInfo");
     v("split", split, "a file is followed by another beyond this size; 0: never");

@@ -34,10 +34,15 @@ Result<std::unique_ptr<TopicCapture>> TopicCapture::open(
   if (auto opened = capture->open_waitset(); !opened) return opened.failure();
   for (const std::string& name : more_topics) {
     if (name == "all") capture->all_ = true;
-    capture->wanted_.insert(participant.topic(name));
+    if (name.starts_with('-')) {
+      capture->unwanted_.insert(participant.topic(name.substr(1)));
+    } else {
+      capture->wanted_.insert(participant.topic(name));
+    }
   }
   for (const CatalogTopic& topic : topic_catalog()) {
     const std::string name = participant.topic(topic.name);
+    if (capture->unwanted_.contains(name)) continue;
     if (topic.on_demand && !capture->wanted_.contains(name)) continue;
     capture->wanted_.insert(name);
     if (auto added = capture->add(name, *topic.schema, topic.qos); !added) return added.failure();
@@ -95,6 +100,7 @@ Result<void> TopicCapture::add(const std::string& ros_name, const MessageSchema&
 }
 
 bool TopicCapture::is_wanted(const std::string& ros_name) const {
+  if (unwanted_.contains(ros_name)) return false;
   if (wanted_.contains(ros_name)) return true;
   return all_ && ros_name.starts_with('/');
 }

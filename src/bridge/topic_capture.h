@@ -26,7 +26,8 @@ struct CapturedTopic {
 /// Takes the messages of many topics as they come, on a thread of its own.
 ///
 /// The default set is every topic of the catalog that is not on demand; others are named below the
-/// namespace or with a leading slash, and "all" is every topic of a known type.
+/// namespace or with a leading slash, "all" is every topic of a known type, and a name after "-" is
+/// left out.
 class TopicCapture {
  public:
   /// Called from the capturing thread; must not block.
@@ -63,7 +64,8 @@ class TopicCapture {
   const Participant& participant_;
   TopicDiscovery discovery_;
   Sink sink_;
-  std::set<std::string> wanted_;  // full names
+  std::set<std::string> wanted_;    // full names
+  std::set<std::string> unwanted_;  // full names; these win
   bool all_ = false;
   std::map<std::string, Source> sources_;
   DdsHandle guard_;

@@ -61,6 +61,25 @@ void note_assumptions(const EvaluationFiles& files, Format truth, const std::str
   if (!times.empty() && files.times.empty()) input->notes.push_back("times from " + times);
 }
 
+/// Everything that stands beside the estimate. `times`: of KITTI poses.
+Result<EvaluationInput> read_beside(const EvaluationFiles& files, Format truth_format,
+                                    const std::string& times, Trajectory estimate) {
+  auto truth = read_trajectory(files.truth, truth_format == Format::kKitti ? times : "");
+  if (!truth) return truth.failure();
+  EvaluationInput input{std::move(*truth), std::move(estimate), {}, {}};
+  if (!files.truth_calibration.empty()) {
+    const auto brought = bring_to_left_camera(files.truth_calibration, &input.truth);
+    if (!brought) return brought.failure();
+  }
+  note_assumptions(files, truth_format, times, &input);
+  if (!files.keyframes.empty()) {
+    auto keyframes = read_keyframes(files.keyframes);
+    if (!keyframes) return keyframes.failure();
+    input.keyframes = std::move(*keyframes);
+  }
+  return input;
+}
+
 }  // namespace
 
 Result<SE3> read_body_from_left(const std::string& path) {
@@ -89,22 +108,17 @@ Result<EvaluationInput> read_evaluation_input(const EvaluationFiles& files) {
   if (!estimate_format) return estimate_format.failure();
   const auto times = times_for(files, *truth_format, *estimate_format);
   if (!times) return times.failure();
-  auto truth = read_trajectory(files.truth, *truth_format == Format::kKitti ? *times : "");
-  if (!truth) return truth.failure();
   auto estimate = read_trajectory(files.estimate, *estimate_format == Format::kKitti ? *times : "");
   if (!estimate) return estimate.failure();
-  EvaluationInput input{std::move(*truth), std::move(*estimate), {}, {}};
-  if (!files.truth_calibration.empty()) {
-    const auto brought = bring_to_left_camera(files.truth_calibration, &input.truth);
-    if (!brought) return brought.failure();
-  }
-  note_assumptions(files, *truth_format, *times, &input);
-  if (!files.keyframes.empty()) {
-    auto keyframes = read_keyframes(files.keyframes);
-    if (!keyframes) return keyframes.failure();
-    input.keyframes = std::move(*keyframes);
-  }
-  return input;
+  return read_beside(files, *truth_format, *times, std::move(*estimate));
+}
+
+Result<EvaluationInput> read_evaluation_input(const EvaluationFiles& files, Trajectory estimate) {
+  const auto truth_format = format_of(files.truth);
+  if (!truth_format) return truth_format.failure();
+  const auto times = times_for(files, *truth_format, Format::kTum);
+  if (!times) return times.failure();
+  return read_beside(files, *truth_format, *times, std::move(estimate));
 }
 
 }  // namespace sovo

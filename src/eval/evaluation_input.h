@@ -29,6 +29,9 @@ struct EvaluationInput {
 /// Reads all files. The error names the file and says what to do.
 Result<EvaluationInput> read_evaluation_input(const EvaluationFiles& files);
 
+/// The same for an estimate that is in no file: of the left camera, stamps ascending.
+Result<EvaluationInput> read_evaluation_input(const EvaluationFiles& files, Trajectory estimate);
+
 /// T_body_left of a calibration: `T_BS` of an EuRoC sensor.yaml (of that very file), else what
 /// `load_calibration` gives as T_base_left.
 Result<SE3> read_body_from_left(const std::string& path);

@@ -136,12 +136,25 @@ std::string draw_axes(const Chart& chart, const Frame& f) {
   return out;
 }
 
+/// Dots of a cloud: lines without length, with round ends.
+std::string draw_cloud(const ChartSeries& series, const Frame& f) {
+  std::string path;
+  for (const auto& [x, y] : series.points) {
+    if (!std::isfinite(x) || !std::isfinite(y)) continue;
+    path += "M" + coordinate(f.px(x)) + " " + coordinate(f.py(y)) + "h0";
+  }
+  if (path.empty()) return "";
+  return "<path d=\"" + path + "\" stroke=\"" + series.colour + "\" class=\"cloud\"/>\n";
+}
+
 std::string draw_series(const ChartSeries& series, const Frame& f) {
+  if (series.cloud) return draw_cloud(series, f);
   std::string path;
   std::string dots;
   bool pen_down = false;
   for (const auto& [x, y] : series.points) {
     if (!std::isfinite(x) || !std::isfinite(y)) {
+      if (pen_down && series.area) path += "Z";
       pen_down = false;
       continue;
     }
@@ -153,6 +166,9 @@ std::string draw_series(const ChartSeries& series, const Frame& f) {
     }
   }
   if (path.empty()) return "";
+  if (series.area) {
+    return "<path d=\"" + path + "Z\" fill=\"" + series.colour + "\" class=\"band\"/>\n";
+  }
   return "<path d=\"" + path + "\" stroke=\"" + series.colour + "\" class=\"line\"" +
          (series.dashed ? " stroke-dasharray=\"6 4\"" : "") + "/>\n" + dots;
 }
@@ -173,8 +189,8 @@ std::string draw_legend(const Chart& chart, const Frame& f) {
   return out;
 }
 
-std::string draw_chart(const Chart& chart, double x, double y, double height) {
-  Frame frame{x + kLeft, y + kTop, kColumn - kLeft - kRight, height - kTop - kBottom, {}, {}};
+std::string draw_chart(const Chart& chart, double x, double y, double width, double height) {
+  Frame frame{x + kLeft, y + kTop, width - kLeft - kRight, height - kTop - kBottom, {}, {}};
   fit_ranges(chart, &frame);
   std::string out = draw_axes(chart, frame);
   for (const ChartSeries& series : chart.series) out += draw_series(series, frame);
@@ -202,10 +218,18 @@ std::vector<double> axis_ticks(double low, double high, int count) {
     }
   }
   const double first = std::ceil(low / spacing - 1e-9);
-  for (double i = first; i * spacing <= high + 1e-9 * spacing; i += 1.0) {
-    ticks.push_back(i * spacing);
+  // Counted, for a step may be lost beside a number that is large enough.
+  for (int i = 0; i <= 2 * count; ++i) {
+    const double tick = (first + i) * spacing;
+    if (!(tick <= high + 1e-9 * spacing)) break;
+    ticks.push_back(tick);
   }
   return ticks;
+}
+
+std::string format_chart(const Chart& chart, double width, double height) {
+  return "<svg viewBox=\"0 0 " + coordinate(width) + " " + coordinate(height) +
+         "\" role=\"img\">\n" + draw_chart(chart, 0.0, 0.0, width, height) + "</svg>\n";
 }
 
 std::string format_charts(const std::string& title, const std::vector<Chart>& charts) {
@@ -214,7 +238,7 @@ std::string format_charts(const std::string& title, const std::vector<Chart>& ch
   for (const Chart& chart : charts) {
     const int column = heights[0] <= heights[1] ? 0 : 1;
     const double height = chart.equal_axes ? 2.0 * kRow : kRow;
-    body += draw_chart(chart, column * kColumn, heights[column], height);
+    body += draw_chart(chart, column * kColumn, heights[column], kColumn, height);
     heights[column] += height;
   }
   const std::string width = coordinate(2.0 * kColumn);

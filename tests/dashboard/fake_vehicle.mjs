@@ -42,11 +42,12 @@ const kTypes = {
   keyframe: "sovo_msgs/msg/Keyframe",
   points: "sensor_msgs/msg/PointCloud2",
   calibration: "sovo_msgs/msg/StereoCalibration",
+  odom: "nav_msgs/msg/Odometry",
 };
 const kMime = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
 
-/** Serves `page` and the vehicle; `send(name, message, seconds)` publishes. */
-export async function startFakeVehicle(page) {
+/** Serves `page` and the vehicles; `send(name, message, seconds, ns)` publishes. */
+export async function startFakeVehicle(page, vehicles = ["/sovo"], port = 0) {
   const server = http.createServer((request, response) => {
     const name = request.url.split("?")[0];
     const file = path.join(page, name === "/" ? "index.html" : path.normalize(name));
@@ -57,6 +58,17 @@ export async function startFakeVehicle(page) {
   const sockets = new WebSocketServer({ server, handleProtocols: (offered) => [...offered][0] });
   const names = Object.keys(kTypes);
   const writers = names.map((n) => new MessageWriter(parse(schemaOf(kTypes[n]), { ros2: true })));
+  const channels = vehicles.flatMap((ns, v) =>
+    names.map((n, i) => ({
+      id: v * names.length + i + 1,
+      topic: `${ns}/${n}`,
+      encoding: "cdr",
+      schemaName: kTypes[n],
+      schema: schemaOf(kTypes[n]),
+      schemaEncoding: "ros2msg",
+    })),
+  );
+  const shown = channels.filter((c) => /^\/[^/]+\/(?!odom$)/.test(c.topic));
   const clients = new Map();
   sockets.on("connection", (socket) => {
     const subscriptions = new Map();
@@ -64,33 +76,38 @@ export async function startFakeVehicle(page) {
     socket.on("close", () => clients.delete(socket));
     socket.on("message", (data) => {
       const message = JSON.parse(String(data));
-      for (const s of message.subscriptions ?? []) subscriptions.set(s.channelId, s.id);
+      if (message.op === "subscribe") {
+        for (const s of message.subscriptions) subscriptions.set(s.channelId, s.id);
+      } else if (message.op === "unsubscribe") {
+        for (const [channel, id] of subscriptions) {
+          if (message.subscriptionIds.includes(id)) subscriptions.delete(channel);
+        }
+      }
     });
     socket.send(JSON.stringify({ op: "serverInfo", name: "fake", capabilities: [], sessionId: "1" }));
-    const channels = names.map((n, i) => ({
-      id: i + 1,
-      topic: `/sovo/${n}`,
-      encoding: "cdr",
-      schemaName: kTypes[n],
-      schema: schemaOf(kTypes[n]),
-      schemaEncoding: "ros2msg",
-    }));
     socket.send(JSON.stringify({ op: "advertise", channels }));
   });
-  await new Promise((resolve) => server.listen(0, "127.0.0.1", resolve));
+  await new Promise((resolve) => server.listen(port, "127.0.0.1", resolve));
   return {
     url: `http://127.0.0.1:${server.address().port}/`,
-    get subscribed() {
-      return [...clients.values()].some((s) => s.size === names.length);
+    /** Whether somebody listens to all that the page shows of a vehicle. */
+    subscribed(ns = "/sovo") {
+      const wanted = shown.filter((c) => c.topic.startsWith(`${ns}/`));
+      return [...clients.values()].some((s) => wanted.every((c) => s.has(c.id)));
+    },
+    isHeard(topic) {
+      const { id } = channels.find((c) => c.topic === topic);
+      return [...clients.values()].some((s) => s.has(id));
     },
     get backlog() {
       return Math.max(0, ...[...clients.keys()].map((s) => s.bufferedAmount));
     },
-    send(name, message, seconds) {
+    send(name, message, seconds, ns = "/sovo") {
       const index = names.indexOf(name);
+      const channel = channels.find((c) => c.topic === `${ns}/${name}`);
       const payload = writers[index].writeMessage(message);
       for (const [socket, subscriptions] of clients) {
-        const id = subscriptions.get(index + 1);
+        const id = subscriptions.get(channel.id);
         if (id === undefined) continue;
         const frame = Buffer.alloc(13 + payload.length);
         frame[0] = 1;

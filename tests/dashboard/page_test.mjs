@@ -47,7 +47,7 @@ try {
   const begin = Date.now();
   page.setDefaultTimeout(120_000);
   await page.goto(vehicle.url);
-  await until(() => vehicle.subscribed, "subscriptions", 60);
+  await until(() => vehicle.subscribed(), "subscriptions", 60);
   console.log(`connected and subscribed after ${Date.now() - begin} ms`);
 
   const half = 30 * kMinutes;

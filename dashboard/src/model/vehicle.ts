@@ -46,6 +46,7 @@ export const kStatusColumns = [
   "scaleStage",
   "points",
   "inliers",
+  "distance",
 ] as const;
 
 export interface KeyframeMark {
@@ -221,6 +222,7 @@ export class Vehicle {
       scaleStage: stage("scale_optimization"),
       points: m.points,
       inliers: m.inliers,
+      distance: m.distance_m,
     });
     this.losses = losses;
     if (!follows) this.startAnew();

@@ -53,11 +53,11 @@ export class Banner {
     const statusRow = vehicle?.statusTable.at(time) ?? -1;
     const pose = (column: "speed" | "depth" | "scaleHigh" | "scale") =>
       vehicle?.poseTable.get(column, poseRow) ?? NaN;
-    const status = (column: "latency" | "rate") => vehicle?.statusTable.get(column, statusRow) ?? NaN;
+    const status = (column: "latency" | "rate" | "distance") => vehicle?.statusTable.get(column, statusRow) ?? NaN;
     const poseStale = live && (!vehicle || now - vehicle.poseHeard > kStaleMs);
     this.speed.set(fixed(pose("speed"), 2), poseStale);
     this.depth.set(fixed(pose("depth"), 2), poseStale);
-    this.distance.set(fixed(vehicle?.status?.distance_m ?? NaN, 1), stale);
+    this.distance.set(fixed(status("distance"), 1), stale);
     this.scale.set(fixed((pose("scaleHigh") / pose("scale") - 1) * 100, 1), poseStale);
     this.latency.set(fixed(status("latency"), 0), stale);
     this.rate.set(stale ? "0.0" : fixed(status("rate"), 1), stale);

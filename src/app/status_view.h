@@ -16,9 +16,9 @@ class StatusSurroundings {
   using Clock = std::chrono::steady_clock;
 
   void add(const bridge::msg::VoStatus& status, Clock::time_point now);
-  void add(const bridge::msg::ScaledOdometry& odometry);
-  void add(const bridge::msg::RecorderStatus& recorder, Clock::time_point now);
-  void add(const bridge::msg::Clock& clock, Clock::time_point now);
+  void add(const bridge::msg::ScaledOdometry& m);
+  void add(const bridge::msg::RecorderStatus& m, Clock::time_point now);
+  void add(const bridge::msg::Clock& m, Clock::time_point now);
 
   /// Lines of text: rate, scale and disk. `utc_ns`: the time of day, which `/clock` stands in for
   /// while a replay publishes it.

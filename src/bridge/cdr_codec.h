@@ -25,7 +25,7 @@ class Decoder {
   template <class T>
   void read(T& value) {
     if constexpr (IsMessage<T>) {
-      MessageTraits<T>::visit(value, [this](const char*, auto& field) { read(field); });
+      MessageTraits<T>::visit(value, [this](const char*, auto& field) { this->read(field); });
     } else if constexpr (IsSequence<T>) {
       read_sequence(value);
     } else if constexpr (std::is_array_v<T>) {
@@ -89,7 +89,8 @@ class Encoder {
   template <class T>
   void write(const T& value) {
     if constexpr (IsMessage<T>) {
-      MessageTraits<T>::visit(value, [this](const char*, const auto& field) { write(field); });
+      MessageTraits<T>::visit(value,
+                              [this](const char*, const auto& field) { this->write(field); });
     } else if constexpr (IsSequence<T>) {
       write(sequence_length(value));
       write_elements(value._buffer, value._length);

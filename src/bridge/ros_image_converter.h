@@ -29,10 +29,10 @@ class RosImageConverter {
   /// Whether `topic` is one of those that it gives.
   bool makes(const std::string& topic) const;
 
-  /// Takes a StereoCalibration message; from then on there is CameraInfo.
-  Result<void> take_calibration(ByteSpan message);
-  /// What stands for a StereoFrame message; nothing for a side that is missing.
-  Result<std::vector<Message>> convert(ByteSpan frame) const;
+  /// `bytes`: a StereoCalibration message. From then on there is CameraInfo.
+  Result<void> take_calibration(ByteSpan bytes);
+  /// `bytes`: a StereoFrame message. What stands for it: nothing for a side that is missing.
+  Result<std::vector<Message>> convert(ByteSpan bytes) const;
 
  private:
   struct Side {

@@ -43,7 +43,7 @@ class Publication {
 
   /// Publishes everything; returns an exit code. `paced`: wait for the odometry.
   int run(std::uint64_t session, bool paced) {
-    wait_for_listener();
+    wait_for_listeners();
     if (auto begun = input_.begin(); !begun) return fail(kFailed, begun.error());
     Progress progress(input_.source->size());
     while (!stop_()) {
@@ -65,12 +65,22 @@ class Publication {
   }
 
  private:
-  /// The first frames of a recording would go unheard while the processes find each other.
-  void wait_for_listener() {
+  /// The first frames of a recording would go unheard while the processes find each other: waits
+  /// for a listener, and for others that are about to be found.
+  void wait_for_listeners() {
+    using Clock = std::chrono::steady_clock;
     constexpr std::chrono::seconds kPatience(5);
-    const auto begin = std::chrono::steady_clock::now();
-    while (publisher_.num_readers() == 0 && !stop_()) {
-      if (std::chrono::steady_clock::now() - begin > kPatience) {
+    constexpr std::chrono::milliseconds kSettled(300);
+    const auto begin = Clock::now();
+    auto changed = begin;
+    std::uint32_t listeners = 0;
+    while (!stop_()) {
+      const auto now = Clock::now();
+      const std::uint32_t found = publisher_.num_readers();
+      if (found != listeners) changed = now;
+      listeners = found;
+      if (listeners > 0 && now - changed > kSettled) return;
+      if (listeners == 0 && now - begin > kPatience) {
         spdlog::warn("nobody listens after {} s; publishing all the same", kPatience.count());
         return;
       }

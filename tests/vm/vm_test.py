@@ -186,7 +186,7 @@ class Cameras(unittest.TestCase):
         for case in ("zed_stream", "loopback"):
             for line in cls.cases.get(case, []):
                 result = json.loads(line[7:]) if line.startswith("RESULT ") else {}
-                if result.get("missing") or result.get("uncounted"):
+                if result.get("missing"):
                     return f"{case} lost images: {line}"
         return None
 
@@ -251,8 +251,11 @@ class Cameras(unittest.TestCase):
 
     def test_loopback_content(self):
         result = self.result("loopback")
-        self.expect_whole(result)
-        self.assertEqual(result["missing"], 0, result)
+        for fault in ("torn", "mixed", "missing", "not_rising"):
+            self.assertEqual(result[fault], 0, result)
+        # The driver's own number jumps once, by its ring of buffers, as a reader joins the writer;
+        # the images' numbers do not.
+        self.assertLessEqual(result["uncounted"], 1, result)
         self.assertGreater(result["frames"], 20)
 
     def test_vivid_faults_are_survived_and_counted(self):

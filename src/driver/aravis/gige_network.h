@@ -40,14 +40,17 @@ int port_share(int speed_mbps);
 /// error lists what there is.
 Result<GigeInfo> find_camera(const std::vector<GigeInfo>& cameras, const std::string& wish);
 
-/// Looks for GigE Vision cameras. libaravis keeps one list a process, so that those who look share
-/// one of these; it may be used by several threads.
+/// Looks for GigE Vision cameras. libaravis keeps one list a process, so that those who look or
+/// open cameras share one of these; it may be used by several threads.
 class GigeNetwork {
  public:
   GigeNetwork();
 
   /// All cameras that answer within a second.
   std::vector<GigeInfo> cameras();
+
+  /// The right to open a camera: libaravis reads one description of features at a time.
+  std::unique_lock<std::mutex> alone() { return std::unique_lock(mutex_); }
 
  private:
   std::mutex mutex_;

@@ -10,6 +10,7 @@
 #include <cstring>
 
 #include "sovo/driver/live/host_clock.h"
+#include "sovo/driver/v4l2/zed_controls.h"
 
 namespace sovo::v4l2 {
 namespace {
@@ -100,7 +101,7 @@ V4l2Capture::~V4l2Capture() {
 Result<void> V4l2Capture::start() {
   const auto settings = parse_controls(options_.v4l2.controls);
   if (!settings) return settings.failure();
-  if (auto set = apply_controls(file_, *settings); !set) return set;
+  if (auto set = apply_settings(file_, mode_.frame_rate, *settings); !set) return set;
   controls_ = list_controls(file_);
   for (std::uint32_t i = 0; i < buffers_.size(); ++i) {
     v4l2_buffer buffer = make_buffer(i);

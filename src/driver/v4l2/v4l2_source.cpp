@@ -6,6 +6,7 @@
 
 #include "sovo/driver/v4l2/capture.h"
 #include "sovo/driver/v4l2/device_list.h"
+#include "sovo/driver/v4l2/zed_controls.h"
 
 namespace sovo::v4l2 {
 namespace {
@@ -69,7 +70,8 @@ Result<Probe> probe(const std::string& wish, const V4l2Options& options, OpenedS
   const auto mode = set_mode(*file, options);
   if (!mode) return problem(mode.failure());
   result.mode = *mode;
-  if (auto set = apply_controls(*file, *parse_controls(options.controls)); !set) {
+  const auto settings = parse_controls(options.controls);
+  if (auto set = apply_settings(*file, mode->frame_rate, *settings); !set) {
     return problem(set.failure());
   }
   return result;

@@ -335,7 +335,8 @@ bool is_shared(const std::vector<GigeInfo>& cameras, const GigeInfo& own,
 
 Result<std::unique_ptr<CaptureDevice>> open_found(const GigeOptions& options, const GigeInfo& info,
                                                   bool shared) {
-  auto camera = open_camera(info, options.network.get());
+  const auto alone = options.network->alone();
+  auto camera = open_camera(info);
   if (!camera) return camera.failure();
   ArvDevice* device = arv_camera_get_device(camera->get());
   const auto sync =
@@ -357,7 +358,8 @@ Result<std::unique_ptr<CaptureDevice>> open_found(const GigeOptions& options, co
 }  // namespace
 
 Result<GigeProbe> probe_gige(const GigeOptions& options, const GigeInfo& info) {
-  const auto camera = open_camera(info, options.network.get());
+  const auto alone = options.network->alone();
+  const auto camera = open_camera(info);
   if (!camera) return named(options.camera(), camera.failure());
   ArvDevice* device = arv_camera_get_device(camera->get());
   if (auto set = set_up_image(camera->get(), options); !set) {

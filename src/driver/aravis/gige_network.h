@@ -49,7 +49,7 @@ class GigeNetwork {
   /// All cameras that answer within a second.
   std::vector<GigeInfo> cameras();
 
-  /// The right to open a camera: libaravis reads one description of features at a time.
+  /// The right to open and set up a camera: libaravis reads one description of features at a time.
   std::unique_lock<std::mutex> alone() { return std::unique_lock(mutex_); }
 
  private:

@@ -89,8 +89,7 @@ Result<void> limit_throughput(ArvCamera* camera, int mbps, int packet_size, int 
 
 }  // namespace
 
-Result<Owned<ArvCamera>> open_camera(const GigeInfo& info, GigeNetwork* network) {
-  const auto alone = network->alone();
+Result<Owned<ArvCamera>> open_camera(const GigeInfo& info) {
   Problem problem;
   Owned<ArvCamera> camera(arv_camera_new(info.id.c_str(), problem.slot()));
   if (!camera) return Error{"cannot be opened: " + problem.text()};

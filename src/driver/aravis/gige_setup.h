@@ -40,7 +40,7 @@ struct GigeOptions {
 constexpr ActionKeys kActionKeys{0x736f766f, 1, 1};
 
 /// Opens a camera and takes control of it.
-Result<Owned<ArvCamera>> open_camera(const GigeInfo& info, GigeNetwork* network);
+Result<Owned<ArvCamera>> open_camera(const GigeInfo& info);
 
 /// Stops what the camera was doing, and sets size, pixel format and, when one is given, frame rate.
 Result<void> set_up_image(ArvCamera* camera, const GigeOptions& options);

@@ -152,7 +152,7 @@ void PointActivator::evaluate(const Window& window, const Candidate& candidate, 
       out->energy += threshold;
       continue;
     }
-    const bool inlier = r.raw_energy < threshold * slack && r.gram[0] + r.gram[4] >= 2.0F;
+    const bool inlier = r.raw_energy < threshold * slack && is_textured(r);
     r.state = inlier ? ResidualState::kIn : ResidualState::kOutlier;
     out->energy += inlier ? r.raw_energy : threshold * slack;
     if (inlier) {

@@ -130,9 +130,13 @@ class DashboardTls(harness.CommandTest):
     def test_what_is_wrong_with_the_files_is_said(self):
         _, other = self.make_certificate("other")
         listen = ["dashboard", *self.bus, "--listen", "127.0.0.1:0"]
+        locked = self.folder / "locked.key"
+        subprocess.run(["openssl", "ec", "-in", self.key, "-aes256", "-passout", "pass:secret",
+                        "-out", locked], check=True, capture_output=True)
         for certificate, key, code, text in [
-                (self.folder / "none.pem", self.key, FAILED, "none.pem"),
-                (self.certificate, self.folder / "none.key", FAILED, "none.key"),
+                (self.certificate, locked, FAILED, "no passphrase"),
+                (self.folder / "none.pem", self.key, FAILED, "none.pem: cannot be read"),
+                (self.certificate, self.folder / "none.key", FAILED, "none.key: cannot be read"),
                 (self.key, self.key, FAILED, "TLS certificate"),
                 (self.certificate, other, FAILED, "key values mismatch")]:
             with self.subTest(certificate=certificate, key=key):

@@ -51,6 +51,24 @@ class TwoHosts(BusTest):
         self.addCleanup(self.end, process)
         return process
 
+    def listen_to_status(self, host):
+        """Numbers of the frames whose status came to a host, and what ends the listening."""
+        listener = self.start_on(host, "topic", "echo", "status", "--json")
+        heard = []
+
+        def listen():
+            for line in listener.stdout:
+                heard.append(json.loads(line)["sequence"])
+
+        thread = threading.Thread(target=listen)
+        thread.start()
+
+        def end():
+            listener.send_signal(signal.SIGINT)
+            thread.join(60)
+
+        return heard, end
+
     @staticmethod
     def eventually(condition):
         end = time.monotonic() + 60
@@ -64,15 +82,7 @@ class TwoHosts(BusTest):
 class CutCable(TwoHosts):
     def test_the_odometry_goes_on_and_subscribers_catch_up(self):
         vo = self.start_on(0, "vo", "--frames", FRAMES)
-        listener = self.start_on(1, "topic", "echo", "status", "--json")
-        heard = []
-
-        def listen():
-            for line in listener.stdout:
-                heard.append(json.loads(line)["sequence"])
-
-        thread = threading.Thread(target=listen)
-        thread.start()
+        heard, end = self.listen_to_status(1)
         camera = self.start_on(0, "camera", "dataset", "--path", DATASET, "--rate", "0.1")
         self.assertTrue(self.eventually(lambda: len(heard) >= 3), camera.stderr)
         self.on(1, "ip", "link", "set", "far", "down")
@@ -83,8 +93,7 @@ class CutCable(TwoHosts):
         self.assertTrue(self.eventually(lambda: len(heard) > before + 3))
         _, log = self.finish(vo)
         self.assertIn(f"received {FRAMES} frames; lost in transport 0, dropped 0", log)
-        listener.send_signal(signal.SIGINT)
-        thread.join(60)
+        end()
         self.assertEqual(heard, sorted(set(heard)))
 
 
@@ -102,22 +111,13 @@ class LossyNetwork(TwoHosts):
 
     def test_the_odometry_goes_on_and_subscribers_have_everything(self):
         vo = self.start_on(1, "vo", "--idle-exit", 8)
-        listener = self.start_on(0, "topic", "echo", "status", "--json")
-        heard = []
-
-        def listen():
-            for line in listener.stdout:
-                heard.append(json.loads(line)["sequence"])
-
-        thread = threading.Thread(target=listen)
-        thread.start()
+        heard, end = self.listen_to_status(0)
         camera = self.start_on(0, "camera", "dataset", "--path", DATASET, "--rate", "0.2")
         self.finish(camera)
         _, log = self.finish(vo)
         received = int(re.search(r"received (\d+) frames", log)[1])
         self.assertGreater(received, FRAMES // 2, log)
-        listener.send_signal(signal.SIGINT)
-        thread.join(60)
+        end()
         self.assertGreater(len(heard), received // 2)
         self.assertEqual(heard, list(range(heard[0], heard[0] + len(heard))), "a gap was not filled")
         self.assertGreaterEqual(heard[-1], FRAMES - 2)

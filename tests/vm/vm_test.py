@@ -253,8 +253,8 @@ class Cameras(unittest.TestCase):
         result = self.result("loopback")
         for fault in ("torn", "mixed", "missing", "not_rising"):
             self.assertEqual(result[fault], 0, result)
-        # The driver's own number jumps once, by its ring of buffers, as a reader joins the writer;
-        # the images' numbers do not.
+        # The driver's own number was seen to jump once a stream, by 8 or 9, where no image was lost;
+        # the numbers in the images are what counts.
         self.assertLessEqual(result["uncounted"], 1, result)
         self.assertGreater(result["frames"], 20)
 

@@ -196,5 +196,33 @@ TEST(PhotometricProblem, StepsDepthsAsTheBackSubstitutionSays) {
   }
 }
 
+TEST(PhotometricProblem, ReclassifiesAsAFreshLinearizationWould) {
+  Window window = scene_window(3, 12);
+  displace(1.0, 5, &window);
+  WorkerPool pool(1);
+  PhotometricProblem problem(WindowConfig(), collect_points(&window), &window, &pool);
+  const WindowLinearization stored = problem.stored();
+  WindowLinearization reclassified;
+  problem.linearize(stored, {.system = false}, &reclassified);
+  int changed = 0;
+  for (const double threshold : {20.0, 2000.0}) {
+    const WindowLinearization before = reclassified;
+    for (int i = 0; i < window.size(); ++i) window[i].outlier_threshold = threshold;
+    problem.reclassify(&reclassified);
+    WindowLinearization fresh;
+    problem.linearize(stored, {.system = false}, &fresh);
+    for (std::size_t k = 0; k < fresh.residuals.size(); ++k) {
+      EXPECT_EQ(reclassified.residuals[k].state, fresh.residuals[k].state);
+      EXPECT_EQ(reclassified.residuals[k].energy, fresh.residuals[k].energy);
+      changed += fresh.residuals[k].state != before.residuals[k].state ? 1 : 0;
+    }
+    for (std::size_t i = 0; i < fresh.depths.size(); ++i) {
+      EXPECT_EQ(reclassified.depths[i].hessian, fresh.depths[i].hessian);
+      EXPECT_EQ(reclassified.depths[i].gradient, fresh.depths[i].gradient);
+    }
+  }
+  EXPECT_GT(changed, 50);
+}
+
 }  // namespace
 }  // namespace sovo

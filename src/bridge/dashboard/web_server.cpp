@@ -18,6 +18,8 @@
 #include <thread>
 #include <utility>
 
+#include "sovo/io/text.h"
+
 // The only file that sees Boost.Beast: it takes the compiler half a minute.
 
 namespace sovo::bridge {
@@ -313,14 +315,23 @@ class WebServer::Impl {
   Result<void> read_certificate() {
     const WebServerConfig& config = context_.config;
     if (config.tls_cert.empty()) return {};
+    // Of a file that is not there, the library says little.
+    for (const std::string& path : {config.tls_cert, config.tls_key}) {
+      if (const auto text = read_text_file(path); !text) return Error{"TLS: " + text.error()};
+    }
     tls_.emplace(ssl::context::tls_server);
     error_code error;
     tls_->set_options(ssl::context::default_workarounds | ssl::context::no_sslv2 |
                       ssl::context::no_sslv3 | ssl::context::no_tlsv1 | ssl::context::no_tlsv1_1);
     tls_->use_certificate_chain_file(config.tls_cert, error);
     if (error) return Error{"TLS certificate " + config.tls_cert + ": " + error.message()};
+    // Nobody is there to be asked for a passphrase.
+    tls_->set_password_callback([](std::size_t, auto) { return std::string(); }, error);
     tls_->use_private_key_file(config.tls_key, ssl::context::pem, error);
-    if (error) return Error{"TLS key " + config.tls_key + ": " + error.message()};
+    if (error) {
+      return Error{"TLS key " + config.tls_key + ": " + error.message() +
+                   ": it must belong to the certificate and have no passphrase"};
+    }
     return {};
   }
 

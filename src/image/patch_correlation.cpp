@@ -1,11 +1,11 @@
 #include "sovo/image/patch_correlation.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 
+#include "sovo/geometry/linear_solvers.h"
 #include "sovo/image/lanes.h"
 
 namespace sovo {
@@ -375,7 +375,7 @@ bool fit(const PatchSearch& search, const Template& base, const Placement& at, b
                static_cast<double>(dot(base.across.data(), target.data())));
   Vec4 x = Vec4::Zero();
   if (both) {
-    x = base.normal.ldlt().solve(b);
+    x = solve_small(base.normal, b);
   } else {
     x.head<3>() = base.normal.topLeftCorner<3, 3>().inverse() * b.head<3>();
   }

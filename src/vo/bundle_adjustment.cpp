@@ -1,11 +1,11 @@
 #include "sovo/vo/bundle_adjustment.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
+
+#include "sovo/geometry/linear_solvers.h"
 
 namespace sovo {
 
@@ -21,15 +21,13 @@ MatX orthonormalized(MatX n) {
     const double norm = n.col(c).norm();
     if (norm > 1e-12) n.col(c) /= norm;
   }
-  using Gram = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 7, 7>;
-  const Gram gram = n.transpose() * n;
-  const Eigen::SelfAdjointEigenSolver<Gram> eigen(gram);
-  const auto& values = eigen.eigenvalues();  // ascending
-  constexpr double kCut = 1e-10;             // of squared lengths
+  const SymmetricEigen eigen = symmetric_eigen(n.transpose() * n);
+  const VecX& values = eigen.values;
+  constexpr double kCut = 1e-10;  // of squared lengths
   Eigen::Index first = 0;
   while (first < values.size() && values[first] <= kCut * values[values.size() - 1]) ++first;
   const Eigen::Index rank = values.size() - first;
-  return n * eigen.eigenvectors().rightCols(rank) *
+  return n * eigen.vectors.rightCols(rank) *
          values.tail(rank).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
@@ -145,7 +143,7 @@ VecX BundleAdjuster::solve(const Window& window, const NormalEquations& system, 
   b = units.cwiseProduct(b);
   const VecX balance = (H.diagonal().array() + 10.0).sqrt().inverse();
   const MatX balanced = balance.asDiagonal() * H * balance.asDiagonal();
-  VecX y = -(balance.cwiseProduct(balanced.ldlt().solve(balance.cwiseProduct(b))));
+  VecX y = -balance.cwiseProduct(solve_symmetric(balanced, balance.cwiseProduct(b)));
   if (remove_gauge) {
     const MatX basis = removable_gauge(window, units);
     y -= basis * (basis.transpose() * y);

@@ -1,10 +1,11 @@
 #include "sovo/vo/coarse_tracker.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
+
+#include "sovo/geometry/linear_solvers.h"
 
 namespace sovo {
 
@@ -56,7 +57,7 @@ Vec8 damped_step(Mat8 H, const Vec8& gradient, const Vec8& prior, const Vec8& un
   H.diagonal() += prior;
   H = units.asDiagonal() * H * units.asDiagonal();
   H.diagonal() *= 1.0 + lambda;
-  Vec8 step = -H.ldlt().solve(units.cwiseProduct(gradient));
+  Vec8 step = -solve_small(H, units.cwiseProduct(gradient));
   if (lambda < kExtrapolationLimit) step *= std::sqrt(std::sqrt(kExtrapolationLimit / lambda));
   if (!step.allFinite()) step.setZero();
   return step;

@@ -1,11 +1,12 @@
 #include "sovo/vo/epipolar_pose.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <random>
+
+#include "sovo/geometry/linear_solvers.h"
 
 namespace sovo {
 namespace {
@@ -69,7 +70,7 @@ bool solve_minimal(const std::array<const Correspondence*, 5>& sample, int itera
     Mat5 H = J.transpose() * J;
     H.diagonal() *= 1.0 + 1e-6;
     H.diagonal() += Vec5::Constant(1e-12);
-    Vec5 step = -H.ldlt().solve(J.transpose() * r);
+    Vec5 step = -solve_small(H, J.transpose() * r);
     if (!step.allFinite()) return false;
     const double length = step.norm();
     if (length > 0.7) step *= 0.7 / length;
@@ -117,7 +118,7 @@ Mat5 refine(const std::vector<Correspondence>& matches, double limit, int iterat
     Mat5 damped = H;
     damped.diagonal() *= 1.0 + 1e-6;
     damped.diagonal() += Vec5::Constant(1e-12);
-    const Vec5 step = -damped.ldlt().solve(g);
+    const Vec5 step = -solve_small(damped, g);
     if (!step.allFinite() || step.norm() > 1.0) break;
     apply_step(step, tangents, T);
     const double cost = truncated_cost(matches, *T, limit, 1e300);
@@ -231,7 +232,7 @@ SO3 estimate_rotation(const std::vector<Correspondence>& matches, double focal, 
       g += w * J.transpose() * r;
     }
     if (iteration == 9) break;
-    R = SO3::exp(-H.ldlt().solve(g)) * R;
+    R = SO3::exp(-solve_small(H, g)) * R;
   }
   *cost /= static_cast<double>(matches.size());
   const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);

@@ -1,8 +1,8 @@
 #include "sovo/vo/marginalization.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "sovo/geometry/linear_solvers.h"
 #include "sovo/vo/bundle_adjustment.h"
 
 namespace sovo {
@@ -58,12 +58,11 @@ void eliminate_last(Eigen::Index n, MatX* H, VecX* b) {
   const VecX bs = inverse_scale.cwiseProduct(*b);
 
   const MatX block = Hs.bottomRightCorner(n, n);
-  const Eigen::SelfAdjointEigenSolver<MatX> eigen(0.5 * (block + block.transpose()));
-  const double cut = 1e-12 * std::max(eigen.eigenvalues().maxCoeff(), 1e-12);
-  VecX inverse = eigen.eigenvalues();
+  const SymmetricEigen eigen = symmetric_eigen(0.5 * (block + block.transpose()));
+  const double cut = 1e-12 * std::max(eigen.values.maxCoeff(), 1e-12);
+  VecX inverse = eigen.values;
   for (Eigen::Index i = 0; i < n; ++i) inverse[i] = inverse[i] > cut ? 1.0 / inverse[i] : 0.0;
-  const MatX block_inverse =
-      eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
+  const MatX block_inverse = eigen.vectors * inverse.asDiagonal() * eigen.vectors.transpose();
 
   const MatX gain = Hs.topRightCorner(keep, n) * block_inverse;
   MatX reduced = Hs.topLeftCorner(keep, keep) - gain * Hs.bottomLeftCorner(n, keep);

@@ -1,11 +1,11 @@
 #include "sovo/vo/patch_tracker.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
 
+#include "sovo/geometry/linear_solvers.h"
 #include "sovo/image/interpolation.h"
 
 namespace sovo {
@@ -265,7 +265,7 @@ double align_rotation(const ImageF& from, const ImageF& to, const CameraModel& c
     rms = std::sqrt(energy / weight_sum);
     *R_to_from = R;
     H.diagonal() += Vec5::Constant(1e-6);
-    const Vec5 step = -H.selfadjointView<Eigen::Lower>().ldlt().solve(g);
+    const Vec5 step = -solve_small(H, g);
     R = SO3::exp(step.head<3>()) * R;
     a += step[3];
     b += step[4];

@@ -1,10 +1,10 @@
 #include "sovo/vo/two_view_refinement.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "sovo/geometry/linear_solvers.h"
 #include "sovo/image/interpolation.h"
 
 namespace sovo {
@@ -128,7 +128,7 @@ Vec8 solve(const Pass& pass, const TwoViewState& state, double lambda) {
   Vec8 scale = (H.diagonal().array().abs() + 10.0).rsqrt();
   const Mat8 scaled = scale.asDiagonal() * H * scale.asDiagonal();
   const Vec8 right = scale.cwiseProduct(pass.g);
-  return -scale.cwiseProduct(scaled.ldlt().solve(right));
+  return -scale.cwiseProduct(solve_small(scaled, right));
 }
 
 std::vector<float> step_depths(const TwoViewRefinementConfig& config, const Vec8& step,

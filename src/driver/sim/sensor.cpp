@@ -55,6 +55,18 @@ void ExposureControl::observe(const std::vector<std::uint8_t>& pixels) {
   scale_by(std::pow(error, config_.exposure_speed * config_.response_gamma));
 }
 
+void change_light(const SensorConfig& config, double since_s, ImageF* light) {
+  constexpr float kVeilLight = 0.4F;  // about the mean of the worlds
+  const bool changed = since_s >= config.light_from_s && since_s < config.light_until_s;
+  const auto factor = static_cast<float>(changed ? config.light_factor : 1.0);
+  const auto veil = static_cast<float>(config.veil);
+  if (veil == 0.0F && factor == 1.0F) return;
+  for (std::size_t i = 0; i < light->size(); ++i) {
+    float& l = light->data()[i];
+    l = factor * (l + veil * (kVeilLight - l));
+  }
+}
+
 Sensor::Sensor(const SensorConfig& config, int width, int height) : config_(config) {
   vignette_.resize(width, height);
   const double cx = 0.5 * (width - 1);

@@ -36,6 +36,9 @@ class ExposureControl {
   double gain_db_;
 };
 
+/// What the air or the water and the lamps do to an image of light, `since_s` after the beginning.
+void change_light(const SensorConfig& config, double since_s, ImageF* light);
+
 /// One camera's sensor: vignette, exposure, noise, response, eight bits.
 class Sensor {
  public:

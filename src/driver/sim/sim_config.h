@@ -62,6 +62,10 @@ struct SensorConfig {
   double shot_noise = 0.8;
   bool motion_blur = true;
   double right_offset_ms = 0.0;
+  double veil = 0.0;
+  double light_factor = 1.0;
+  double light_from_s = 0.0;
+  double light_until_s = 1e9;
   double drop_rate = 0.0;
   Side dark = Side::kNone;
   double dark_from_s = 0.0;
@@ -84,6 +88,10 @@ struct SensorConfig {
     v("shot_noise", shot_noise, "standard deviation added by light, at full scale [grey levels]");
     v("motion_blur", motion_blur, "blur by motion during the exposure");
     v("right_offset_ms", right_offset_ms, "the right camera exposes later by this [ms]");
+    v("veil", veil, "share of the light that fog or turbid water spreads evenly");
+    v("light_factor", light_factor, "the world's light changes at once by this factor");
+    v("light_from_s", light_from_s, "time from which on it is changed [s]");
+    v("light_until_s", light_until_s, "time until which it is changed [s]");
     v("drop_rate", drop_rate, "share of pairs that are lost");
     v("dark", dark, "camera that goes dark");
     v("dark_from_s", dark_from_s, "time from which on it is dark [s]");

@@ -94,6 +94,37 @@ class CameraFiles {
   std::string times_;
 };
 
+/// True depths of the same left pixels of some pairs, as comma separated values.
+class DepthTable {
+ public:
+  static constexpr std::size_t kEvery = 10;  ///< Pairs: an image of depths is rendered for it.
+
+  DepthTable(int width, int height) {
+    constexpr int kColumns = 12;
+    constexpr int kRows = 8;
+    for (int row = 0; row < kRows; ++row) {
+      for (int column = 0; column < kColumns; ++column) {
+        pixels_.emplace_back((2 * column + 1) * width / (2 * kColumns),
+                             (2 * row + 1) * height / (2 * kRows));
+      }
+    }
+  }
+
+  void add(std::int64_t stamp_ns, const ImageF& depth) {
+    const std::string stamp = std::to_string(stamp_ns);
+    for (const auto& [u, v] : pixels_) {
+      text_ += stamp + "," + std::to_string(u) + "," + std::to_string(v) + "," +
+               format_float(depth.at(u, v)) + "\n";
+    }
+  }
+
+  const std::string& text() const { return text_; }
+
+ private:
+  std::vector<std::pair<int, int>> pixels_;
+  std::string text_ = "#timestamp [ns],u [px],v [px],depth [m]\n";
+};
+
 }  // namespace
 
 Result<void> write_pfm(const std::string& path, const ImageF& image) {
@@ -122,6 +153,7 @@ Result<void> export_dataset(SimSource* source, const std::string& directory, boo
   if (auto ok = right.begin(rig.right, T_body_right, rate, c.right_photometric); !ok) return ok;
   if (depth) fs::create_directories(root / "depth");
   Trajectory truth;
+  DepthTable table(rig.left.width, rig.left.height);
   for (std::size_t done = 0;;) {
     const SourceResult next = source->next(std::chrono::seconds(10));
     if (next.state == SourceState::kEndOfStream) break;
@@ -131,14 +163,19 @@ Result<void> export_dataset(SimSource* source, const std::string& directory, boo
     const std::int64_t right_stamp = stamp + next.frame.right.stamp_offset_ns;
     if (auto ok = right.add(next.frame.right, right_stamp); !ok) return ok;
     truth.push_back({stamp, source->pose_at(stamp)});
+    const bool in_table = done % DepthTable::kEvery == 0;
+    const ImageF true_depth = depth || in_table ? source->depth_at(stamp) : ImageF();
+    if (in_table) table.add(stamp, true_depth);
     if (depth) {
       const fs::path file = root / "depth" / (std::to_string(stamp) + ".pfm");
-      if (auto ok = write_pfm(file.string(), source->depth_at(stamp)); !ok) return ok;
+      if (auto ok = write_pfm(file.string(), true_depth); !ok) return ok;
     }
-    if (progress && !progress(++done)) break;
+    ++done;
+    if (progress && !progress(done)) break;
   }
   if (auto ok = left.finish(); !ok) return ok;
   if (auto ok = right.finish(); !ok) return ok;
+  if (auto ok = write_text_file((root / "depth.csv").string(), table.text()); !ok) return ok;
   return write_tum((root / "groundtruth_cam0_tum.txt").string(), truth,
                    "simulated: t tx ty tz qx qy qz qw of the left camera");
 }

@@ -14,6 +14,9 @@ namespace sovo::sim {
 ///     DIR/dso/cam0|cam1/{times.txt, pcalib.txt, vignette.png}   exposures; response and vignette
 ///                                                              when the calibration knows them
 ///     DIR/groundtruth_cam0_tum.txt                             poses of the left camera
+///     DIR/depth.csv                                            depth [m] at a grid of about a
+///                                                              hundred left pixels of every
+///                                                              tenth pair
 ///     DIR/depth/STAMP.pfm                                      with `depth`: distance along the
 ///                                                              optical axis [m], 0 for the sky
 ///

@@ -62,6 +62,10 @@ Result<void> check(const SimConfig& config) {
     return Error{"frame_rate must be at most 1000 Hz, or 0 for the world's own"};
   }
   if (config.start < 0) return Error{"start must not be negative"};
+  if (!(s.veil >= 0.0 && s.veil <= 0.99)) return Error{"sensor.veil must be in [0, 0.99]"};
+  if (!(s.light_factor >= 0.01 && s.light_factor <= 100.0)) {
+    return Error{"sensor.light_factor must be in [0.01, 100]"};
+  }
   if (s.vignette < 0.0 || s.vignette > 0.9) return Error{"sensor.vignette must be in [0, 0.9]"};
   if (!(s.response_gamma >= 0.2 && s.response_gamma <= 5.0)) {
     return Error{"sensor.response_gamma must be in [0.2, 5]"};
@@ -135,6 +139,8 @@ SideImage SimSource::make_side(Side which, double t, std::uint64_t frame, Render
   const auto pose = [&](double time) { return motion_.at(time) * T_left_camera; };
   RenderedImage image;
   renderer->render(pose(t), t, &image);
+  const double since = time_of(frame);
+  change_light(config_.sensor, since, &image.light);
   if (!settled_) exposure->settle(image.light);
   ImageF blurred;
   if (config_.sensor.motion_blur) {
@@ -142,7 +148,6 @@ SideImage SimSource::make_side(Side which, double t, std::uint64_t frame, Render
     const Vec6 velocity = along * velocity_of(pose(t - h), pose(t + h), 2.0 * h);
     blur_by_motion(renderer->rays(), image, velocity, exposure->exposure_s(), &blurred);
   }
-  const double since = time_of(frame);
   const bool dark = config_.sensor.dark == which && since >= config_.sensor.dark_from_s &&
                     since < config_.sensor.dark_until_s;
   const std::uint64_t seed =

@@ -31,12 +31,14 @@ struct TrackerConfig {
 };
 
 /// When a frame becomes a keyframe: the weighted sum of the flow since the newest one (in units of
-/// 1120 / (width + height)), the brightness change, or a residual twice the first one's.
+/// 1120 / (width + height)) and the brightness change exceeds 1, or a smaller sum and a residual
+/// twice the first one's.
 struct KeyframeConfig {
   double flow_translation = 0.04;
   double flow_total = 0.02;
   double brightness = 2.0;
   double rmse_factor = 2.0;
+  double rmse_min_score = 0.2;
   int max_keyframes = 7;          ///< In the window, the newest included.
   int min_keyframes = 5;          ///< Kept although few of their points remain.
   double min_points_left = 0.05;  ///< A keyframe with a smaller share of its points leaves.
@@ -48,6 +50,7 @@ struct KeyframeConfig {
     v("flow_total", flow_total, "weight of the flow");
     v("brightness", brightness, "weight of the change of log-gain");
     v("rmse_factor", rmse_factor, "a keyframe is made above this x the first residual");
+    v("rmse_min_score", rmse_min_score, "weighted sum below which no residual makes a keyframe");
     v("max_keyframes", max_keyframes, "keyframes in the window, 3 to 8");
     v("min_keyframes", min_keyframes, "kept although few of their points remain");
     v("min_points_left", min_points_left, "share of points below which a keyframe leaves");
@@ -90,6 +93,7 @@ struct WindowConfig {
   double gradient_constant = 50.0;   ///< c of the weight c^2 / (c^2 + |grad I|^2).
   double folding_weight = 0.25;  ///< Of marginalized points' Hessians: pattern pixels correlate.
   double damping = 1e-5;
+  double depth_damping = 100.0;            ///< Added to H_rho * mean_rho^2 of every point.
   double stop_threshold = 1.2;             ///< Times the step norms below which iteration stops.
   double prior_a = 1e4;                    ///< Weight of the prior on each frame's log-gain.
   double prior_b = 1.0;                    ///< The same for the bias.
@@ -105,6 +109,8 @@ struct WindowConfig {
     v("gradient_constant", gradient_constant, "c of the weight c^2 / (c^2 + |grad|^2)");
     v("folding_weight", folding_weight, "of marginalized points' Hessians");
     v("damping", damping, "smallest Levenberg-Marquardt damping");
+    v("depth_damping", depth_damping,
+      "added to the information on a point's log-depth: what no parallax shows stays as it is");
     v("stop_threshold", stop_threshold, "iteration stops below this x the step thresholds");
     v("prior_a", prior_a, "weight of the prior on each frame's log-gain");
     v("prior_b", prior_b, "weight of the prior on each frame's bias");

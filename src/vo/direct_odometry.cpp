@@ -59,11 +59,17 @@ std::unique_ptr<Keyframe> new_keyframe(std::uint32_t id, const MonoFrame& frame,
 }
 
 /// Standard deviation of a point's inverse depth; 0 when that says nothing about its depth.
-double known_sigma(const Point& p) {
-  if (p.hessian <= 0.0) return 0.0;
+double known_sigma(const Point& p, double rho_unit) {
+  const double information = depth_information(p, rho_unit);
+  if (information <= 0.0) return 0.0;
   // Pattern pixels are correlated: half of them count.
-  const double sigma = kPixelNoise * std::sqrt(2.0 / p.hessian);
+  const double sigma = kPixelNoise * std::sqrt(2.0 / information);
   return sigma > kMaxRelativeSigma * p.rho ? 0.0 : sigma;
+}
+
+/// The same as `Point::hessian` that a match's deviation stands for.
+double information_of(const DepthProposal& depth) {
+  return std::pow(kPixelNoise / std::max(depth.sigma, 1e-6F), 2);
 }
 
 /// Narrows an immature point's interval to a proposed depth.
@@ -72,7 +78,7 @@ void set_interval(const DepthProposal& depth, double sigmas, ImmaturePoint* p) {
   const auto half = static_cast<float>(sigmas) * depth.sigma;
   p->rho_min = std::max(depth.rho - half, 0.0F);
   p->rho_max = depth.rho + half;
-  p->from_static_match = true;
+  p->static_information = static_cast<float>(information_of(depth));
 }
 
 Point start_point(const ImmaturePoint& immature, const DepthProposal& depth) {
@@ -83,7 +89,8 @@ Point start_point(const ImmaturePoint& immature, const DepthProposal& depth) {
   p.colour = immature.colour;
   p.weight = immature.weight;
   p.rho = std::max(depth.rho, 1e-5F);
-  p.hessian = std::pow(kPixelNoise / std::max(depth.sigma, 1e-6F), 2);
+  p.hessian = information_of(depth);
+  p.static_information = static_cast<float>(p.hessian);
   p.last_state = ResidualState::kIn;
   return p;
 }
@@ -224,8 +231,9 @@ std::vector<KeyframeState> DirectOdometry::marginalize(const MapTimer& timer) {
   const StageTimer t(timer, MapStage::kMarginalization);
   record_poses();  // of those that leave now
   const LeavingPoints leaving = mark_leaving_points(config_.window, &window_);
+  const double rho_unit = window_.mean_inverse_depth();
   for (const PointRef& ref : leaving.marginalize) {
-    keep_point(*ref.point, &marginalized_[window_[ref.host].id]);
+    keep_point(*ref.point, rho_unit, &marginalized_[window_[ref.host].id]);
   }
   marginalize_points(config_.window, leaving.marginalize, &window_, pool_);
   erase_marked_points(&window_);
@@ -241,8 +249,8 @@ std::vector<KeyframeState> DirectOdometry::marginalize(const MapTimer& timer) {
   return left;
 }
 
-void DirectOdometry::keep_point(const Point& point, KeyframePoints* points) const {
-  const double sigma = known_sigma(point);
+void DirectOdometry::keep_point(const Point& point, double rho_unit, KeyframePoints* points) const {
+  const double sigma = known_sigma(point, rho_unit);
   if (sigma <= 0.0) return;
   const double to_first_unit = std::exp(log_scale_);
   points->u.push_back(point.u);
@@ -260,9 +268,10 @@ KeyframeState DirectOdometry::state_without_active_points(const Keyframe& keyfra
 
 std::vector<KeyframeState> DirectOdometry::window_keyframes() const {
   std::vector<KeyframeState> states;
+  const double rho_unit = window_.mean_inverse_depth();
   for (int i = 0; i < window_.size(); ++i) {
     states.push_back(state_without_active_points(window_[i]));
-    for (const Point& p : window_[i].points) keep_point(p, &states.back().points);
+    for (const Point& p : window_[i].points) keep_point(p, rho_unit, &states.back().points);
   }
   return states;
 }
@@ -333,7 +342,7 @@ void DirectOdometry::take_snapshot() {
     for (Point& p : window_[h].points) {
       const bool was_in = std::exchange(p.in_snapshot, false);
       const Residual& r = p.residuals[slot];
-      const double sigma = known_sigma(p);
+      const double sigma = known_sigma(p, s.mean_inverse_depth);
       if (r.state != ResidualState::kIn || sigma <= 0.0 || r.centre_rho <= 0.0F) continue;
       const double ratio = r.centre_rho / p.rho;
       s.points.u.push_back(r.centre_u);

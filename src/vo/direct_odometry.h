@@ -141,7 +141,7 @@ class DirectOdometry {
                           const DepthProposer& proposer, const MapTimer& timer);
   void add_immature_points(const DepthProposer& proposer, const MapTimer& timer);
   std::vector<KeyframeState> marginalize(const MapTimer& timer);
-  void keep_point(const Point& point, KeyframePoints* points) const;
+  void keep_point(const Point& point, double rho_unit, KeyframePoints* points) const;
   KeyframeState state_without_active_points(const Keyframe& keyframe) const;
   void publish_reference();
   void record_poses();

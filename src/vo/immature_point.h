@@ -32,7 +32,11 @@ struct ImmaturePoint {
   float quality = 10000.0F;                                 ///< Second-best over best energy.
   float interval_px = 0.0F;                                 ///< Length of the newest search.
   TraceState state = TraceState::kUntraced;
-  bool from_static_match = false;
+  /// On rho, of the stereo match that gave the interval, as `Point::static_information`; 0: there
+  /// was none [m^2].
+  float static_information = 0.0F;
+
+  bool from_static_match() const { return static_information > 0.0F; }
 };
 
 }  // namespace sovo

@@ -44,7 +44,11 @@ bool wants_keyframe(const KeyframeConfig& config, const CameraModel& camera,
   const double score = config.flow_translation * unit * tracked.flow_translation +
                        config.flow_total * unit * tracked.flow_total +
                        config.brightness * std::abs(std::log(transfer.gain));
-  return score > 1.0 || tracked.rmse > config.rmse_factor * first_rmse;
+  // The residual of a camera at rest is noise, and twice of it nothing that a keyframe would mend:
+  // without parallax the window's scale would be left to that noise.
+  const bool fits_badly =
+      tracked.rmse > config.rmse_factor * first_rmse && score > config.rmse_min_score;
+  return score > 1.0 || fits_badly;
 }
 
 void mark_leaving_keyframes(const KeyframeConfig& config, Window* window) {

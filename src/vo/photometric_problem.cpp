@@ -1,6 +1,7 @@
 #include "sovo/vo/photometric_problem.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "sovo/vo/linearization.h"
@@ -57,7 +58,11 @@ std::vector<Vec8> relative_displacements(const Window& window, const VecX& x) {
 
 PhotometricProblem::PhotometricProblem(const WindowConfig& config, std::vector<PointRef> points,
                                        Window* window, WorkerPool* pool)
-    : config_(config), points_(std::move(points)), window_(window), pool_(pool) {
+    : config_(config),
+      depth_damping_(config.depth_damping / std::pow(window->mean_inverse_depth(), 2)),
+      points_(std::move(points)),
+      window_(window),
+      pool_(pool) {
   first_.reserve(points_.size() + 1);
   first_.push_back(0);
   for (std::size_t i = 0; i < points_.size(); ++i) {
@@ -140,7 +145,9 @@ void PhotometricProblem::linearize_block(const Block& block, const WindowLineari
       }
       out->depths[i] = depth;
       if (request.system) {
-        sums->add({residuals.data(), count}, depth.hessian, depth.gradient);
+        // What is folded into the prior is the information as it is.
+        const double hessian = request.at_frozen_poses ? depth.hessian : damped(depth.hessian);
+        sums->add({residuals.data(), count}, hessian, depth.gradient);
       }
     }
   }
@@ -205,7 +212,7 @@ void PhotometricProblem::step_depths(const WindowLinearization& at, const VecX& 
         b += static_cast<double>(sum_lane(load_lane(&r.cross[0]) * load_lane(&step[0]) +
                                           load_lane(&r.cross[4]) * load_lane(&step[4])));
       }
-      points_[i].point->rho -= b / (depth.hessian * (1.0 + lambda));
+      points_[i].point->rho -= b / (damped(depth.hessian) * (1.0 + lambda));
     }
   }
 }

@@ -100,10 +100,13 @@ class PhotometricProblem {
     int host = 0;
     std::size_t begin = 0, end = 0;  ///< Points.
   };
+  /// What a solver divides by: without parallax the step of a depth is otherwise noise over noise.
+  double damped(double hessian) const { return hessian + depth_damping_; }
   void linearize_block(const Block& block, const WindowLinearization& known, const Request& request,
                        WindowLinearization* out, HostSums* sums, double* energy) const;
 
   WindowConfig config_;
+  double depth_damping_;  ///< [m^2]
   std::vector<PointRef> points_;
   Window* window_;
   WorkerPool* pool_;

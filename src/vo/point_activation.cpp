@@ -10,20 +10,20 @@ namespace {
 
 constexpr int kIterations = 3;
 constexpr double kDepthStartLambda = 0.1;
-constexpr double kStopStep = 1e-4;         // relative
-constexpr double kMinInformation = 100.0;  // H_rho_rho * mean_rho^2
+constexpr double kStopStep = 1e-4;                // relative
+constexpr double kMinStaticInformation = 1000.0;  // on log-depth: known to about 15 %
 constexpr int kCandidateBlock = 32;
 
 bool is_ready(const ImmaturePoint& p, const PointConfig& config) {
   const bool traced = p.state == TraceState::kGood || p.state == TraceState::kSkipped ||
-                      p.state == TraceState::kBadCondition || p.from_static_match;
+                      p.state == TraceState::kBadCondition || p.from_static_match();
   return traced && p.state != TraceState::kOutlier && p.state != TraceState::kOutOfView &&
          std::isfinite(p.rho_max) && p.interval_px < static_cast<float>(config.max_interval_px) &&
          p.quality > static_cast<float>(config.min_quality) && p.rho_min + p.rho_max > 0.0F;
 }
 
 bool is_dead(const ImmaturePoint& p, bool host_leaves) {
-  if (p.state == TraceState::kOutlier) return !p.from_static_match || host_leaves;
+  if (p.state == TraceState::kOutlier) return !p.from_static_match() || host_leaves;
   return p.state == TraceState::kOutOfView || host_leaves;
 }
 
@@ -173,16 +173,19 @@ void PointActivator::optimize(const Window& window, double mean_rho, Candidate* 
   p.weight = immature.weight;
   p.type = immature.type;
   p.rho = std::max(0.5 * (static_cast<double>(immature.rho_min) + immature.rho_max), 1e-6);
+  p.static_information = immature.static_information;
 
   DepthEvaluation now;
   evaluate(window, *candidate, p, 1e3, &now);
   const double unit = mean_rho * mean_rho;
   double lambda = kDepthStartLambda;
-  if (now.hessian * unit < kMinInformation) return;  // stays immature
+  // A camera that turns on the spot shows no parallax, and yet needs points: those of stereo.
+  const bool known = p.static_information * p.rho * p.rho >= kMinStaticInformation;
+  if (now.hessian * unit < kMinRelativeInformation && !known) return;  // stays immature
   double best_rho = p.rho;
   evaluate(window, *candidate, p, 1.0, &now);
   DepthEvaluation next;
-  for (int it = 0; it < kIterations && now.hessian * unit >= kMinInformation; ++it) {
+  for (int it = 0; it < kIterations && now.hessian * unit >= kMinRelativeInformation; ++it) {
     const double step = now.gradient / (now.hessian * (1.0 + lambda));
     p.rho = best_rho - step;
     evaluate(window, *candidate, p, 1.0, &next);

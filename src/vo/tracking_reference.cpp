@@ -60,7 +60,7 @@ DepthMap splat(const Window& window, std::size_t* count) {
   *count = 0;
   for (int h = 0; h < window.size(); ++h) {
     for (const Point& p : window[h].points) {
-      const double information = p.hessian * rho_unit * rho_unit;
+      const double information = depth_information(p, rho_unit) * rho_unit * rho_unit;
       const auto weight = static_cast<float>(std::sqrt(1e-3 * (information + 1e-6)));
       if (h + 1 == window.size()) {
         map.add(p.u, p.v, static_cast<float>(p.rho), weight);

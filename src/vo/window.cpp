@@ -117,15 +117,25 @@ int Window::num_active_points() const {
 }
 
 double Window::mean_inverse_depth() const {
-  double sum = 0.0;
-  int n = 0;
+  std::vector<double> rhos;
+  rhos.reserve(static_cast<std::size_t>(num_active_points()));
   for (const auto& k : keyframes_) {
-    for (const Point& p : k->points) {
-      sum += p.rho;
-      ++n;
-    }
+    for (const Point& p : k->points) rhos.push_back(p.rho);
   }
-  return n > 0 && sum > 0.0 ? sum / n : 1.0;
+  if (rhos.empty()) return 1.0;
+  const auto middle = rhos.begin() + static_cast<std::ptrdiff_t>(rhos.size() / 2);
+  std::nth_element(rhos.begin(), middle, rhos.end());
+  // Thresholds hang on it: a few points that have gone astray must not move them.
+  constexpr double kMostMedians = 5.0;
+  const double most = kMostMedians * std::max(*middle, 0.0);
+  double sum = 0.0;
+  for (const double rho : rhos) sum += std::min(rho, most);
+  return sum > 0.0 ? sum / static_cast<double>(rhos.size()) : 1.0;
+}
+
+double depth_information(const Point& point, double rho_unit) {
+  if (point.hessian * rho_unit * rho_unit >= kMinRelativeInformation) return point.hessian;
+  return std::max(point.hessian, static_cast<double>(point.static_information));
 }
 
 void Window::apply_similarity(double scale) {
@@ -140,12 +150,14 @@ void Window::apply_similarity(double scale) {
     for (Point& p : k->points) {
       p.rho /= scale;
       p.hessian *= scale * scale;
+      p.static_information *= static_cast<float>(scale * scale);
       p.gradient *= scale;
       for (Residual& r : p.residuals) r.centre_rho *= rho_scale;
     }
     for (ImmaturePoint& p : k->immature) {
       p.rho_min *= rho_scale;
       p.rho_max *= rho_scale;
+      p.static_information *= static_cast<float>(scale * scale);
     }
   }
   for (int i = 0; i < size(); ++i) {

@@ -51,10 +51,11 @@ struct Point {
   std::array<float, kPatternSize> weight{};  ///< Gradient weights of the pattern.
   std::uint8_t type = 1;                     ///< Block size of the selection: 1, 2, 4.
   double rho = 0.0;                          ///< Inverse depth, current estimate [1/m].
-  double hessian = 0.0;            ///< H_rho_rho of the newest linearization, without priors.
-  double gradient = 0.0;           ///< b_rho.
-  float relative_baseline = 0.0F;  ///< Largest baseline * rho of its good residuals.
-  int good_residuals = 0;          ///< Inlier residuals on record, counted at every keyframe.
+  double hessian = 0.0;             ///< H_rho_rho of the newest linearization, without priors.
+  double gradient = 0.0;            ///< b_rho.
+  float static_information = 0.0F;  ///< As `hessian`, of a stereo match of the host; 0: none.
+  float relative_baseline = 0.0F;   ///< Largest baseline * rho of its good residuals.
+  int good_residuals = 0;           ///< Inlier residuals on record, counted at every keyframe.
   bool remove = false;
   bool in_snapshot = false;                     ///< Was part of the last snapshot.
   std::array<Residual, kMaxSlots> residuals{};  ///< By target slot.
@@ -68,6 +69,14 @@ struct Point {
     return n;
   }
 };
+
+/// Information on a point's log-depth, in squared grey levels of the weighted pattern, below which
+/// parallax tells nothing about it.
+inline constexpr double kMinRelativeInformation = 100.0;
+
+/// Information on a point's inverse depth [m^2]: that of parallax or, where there is none, that of
+/// the stereo match which gave the first depth. `rho_unit`: the window's mean inverse depth [1/m].
+double depth_information(const Point& point, double rho_unit);
 
 /// A keyframe of the window. Its pose and brightness are a frozen linearization point and a
 /// displacement x = (translation, rotation, a, b): T_camera_world = exp(x) * frozen
@@ -157,7 +166,8 @@ class Window {
   VecX stacked_x() const;
 
   int num_active_points() const;
-  /// Mean inverse depth of the active points; 1 when there are none [1/m].
+  /// Mean inverse depth of the active points, each counted as at most five medians; 1 when there
+  /// are none [1/m].
   double mean_inverse_depth() const;
 
   /// Applies the similarity p -> centre + scale * (p - centre), the centre being the newest

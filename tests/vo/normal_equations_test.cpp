@@ -65,9 +65,15 @@ Mat48 state_jacobian(const LinearizedResidual& r) {
   return D;
 }
 
+/// Of a depth's Hessian [m^2].
+double depth_damping(const WindowConfig& config, const Window& window) {
+  return config.depth_damping / std::pow(window.mean_inverse_depth(), 2);
+}
+
 /// The normal equations of a window, residual by residual, dense and in double precision.
 NormalEquations plain_system(const WindowConfig& config, Window* window) {
   const Eigen::Index n = 8 * window->size();
+  const double damping = depth_damping(config, *window);
   NormalEquations out{MatX::Zero(n, n), MatX::Zero(n, n), VecX::Zero(n), VecX::Zero(n), 0};
   for (const PointRef& ref : collect_points(window)) {
     double hessian = 0.0;
@@ -93,8 +99,8 @@ NormalEquations plain_system(const WindowConfig& config, Window* window) {
       ++out.residuals;
     }
     if (hessian <= 1e-10) continue;
-    out.schur += row * row.transpose() / hessian;
-    out.b_schur += row * gradient / hessian;
+    out.schur += row * row.transpose() / (hessian + damping);
+    out.b_schur += row * gradient / (hessian + damping);
   }
   return out;
 }
@@ -188,7 +194,8 @@ TEST(PhotometricProblem, StepsDepthsAsTheBackSubstitutionSays) {
       }
     }
     const double hessian = at.depths[i].hessian;
-    expected.push_back(ref.point->rho - (hessian > 1e-10 ? b / (1.1 * hessian) : 0.0));
+    const double damped = hessian + depth_damping(WindowConfig(), window);
+    expected.push_back(ref.point->rho - (hessian > 1e-10 ? b / (1.1 * damped) : 0.0));
   }
   problem.step_depths(at, dx, 0.1);
   for (std::size_t i = 0; i < expected.size(); ++i) {

@@ -15,7 +15,7 @@ constexpr int kGaugeKeyframes = 5;
 
 WindowConfig without_priors() {
   WindowConfig config;
-  config.prior_a = config.prior_b = 0.0;
+  config.prior_a = config.prior_b = config.depth_damping = 0.0;
   return config;
 }
 
@@ -155,10 +155,12 @@ TEST_F(WindowGauge, SimilarityScalesImmatureIntervals) {
   ImmaturePoint p;
   p.rho_min = 0.2F;
   p.rho_max = 0.5F;
+  p.static_information = 30.0F;
   window_[1].immature = {p, ImmaturePoint()};
   window_.apply_similarity(2.0);
   EXPECT_FLOAT_EQ(window_[1].immature[0].rho_min, 0.1F);
   EXPECT_FLOAT_EQ(window_[1].immature[0].rho_max, 0.25F);
+  EXPECT_FLOAT_EQ(window_[1].immature[0].static_information, 120.0F);
   EXPECT_TRUE(std::isnan(window_[1].immature[1].rho_max));
 }
 

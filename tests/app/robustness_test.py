@@ -1,0 +1,119 @@
+"""What a direct method dislikes, flown through rendered worlds: `sovo run --world`."""
+
+import math
+import os
+
+import harness
+from harness import FAILED, OK, largest_error, read_tum, sovo
+from sim_test import SimTest
+
+LONG = bool(os.environ.get("SOVO_TEST_LONG"))
+
+
+def eased(t, begin, end):
+    """From 0 to 1, with velocity and acceleration 0 at both ends."""
+    u = min(1.0, max(0.0, (t - begin) / (end - begin)))
+    return u * u * u * (u * (6 * u - 15) + 10)
+
+
+def turned(yaw, pitch=0.0):
+    """Quaternion x y z w of a vehicle (x forward, y left, z up) [rad]."""
+    cy, sy, cp, sp = (f(0.5 * a) for a in (yaw, pitch) for f in (math.cos, math.sin))
+    return [-sy * sp, cy * sp, sy * cp, cy * cp]
+
+
+def restless(t, halt):
+    """Loops with turns of up to 110 deg/s and 2.5 m/s, which end in a halt within 0.6 s."""
+    braked = min(1.0, max(0.0, (t - halt) / 0.6))
+    a = 2 * math.pi / 2.6 * (min(t, halt) + 0.3 * (1 - (1 - braked) ** 2))
+    return ([0.9 * math.sin(2 * a), 1.2 * math.sin(a), 0.3 * math.sin(2 * a)],
+            turned(math.radians(45) * math.sin(a), math.radians(15) * math.sin(1.7 * a)))
+
+
+class Robustness(SimTest):
+    def trajectory(self, pose, seconds):
+        path = self.folder / "trajectory.txt"
+        with path.open("w") as file:
+            for i in range(round(50 * seconds) + 1):
+                position, rotation = pose(0.02 * i)
+                numbers = " ".join(f"{v:.9f}" for v in [*position, *rotation])
+                file.write(f"{1.6e9 + 0.02 * i:.2f} {numbers}\n")
+        return ("--trajectory", path, "--set", "sim.trajectory_body=base")
+
+    def fly(self, world, *options, code=OK, **sensor):
+        truth, live, scales = (self.folder / n for n in ("truth.txt", "live.txt", "scales.csv"))
+        settings = [part for key, value in sensor.items()
+                    for part in ("--set", f"sim.sensor.{key}={value}")]
+        result = sovo("run", "--deterministic", "--world", world, "--calib", self.calibration,
+                      "--truth", truth, "--out-live", live, "--keyframes", scales, *options,
+                      *settings)
+        self.expect(result, code)
+        if code != OK:
+            return result
+        self.log = result.stderr
+        self.verdicts = [line.strip().split(",") for line in scales.read_text().splitlines()[1:]]
+        return read_tum(truth), read_tum(live)
+
+    def expect_whole(self, truth, live, error_m):
+        self.assertEqual(len(live), len(truth))
+        self.assertNotIn("LOST", self.log)
+        self.assertLess(largest_error(live, truth, live[0][0]), error_m)
+
+    def test_grass_turned_through_at_seven_degrees_a_frame(self):
+        part = () if LONG else ("--start", 60, "--frames", 80)
+        for direction in ((), ("--reverse",)):
+            truth, live = self.fly("lawn", *part, *direction, "--set", "sim.frame_rate=12.5")
+            self.assertEqual(len(live), len(truth))
+            path = sum(math.dist(a[1], b[1]) for a, b in zip(truth, truth[1:]))
+            origin = live[-1 if direction else 0][0]
+            self.assertLess(largest_error(live, truth, origin), 0.005 * path)
+
+    def test_the_light_changes_at_once(self):
+        truth, live = self.fly("hall", "--frames", 110, light_factor=0.35, light_from_s=1.5,
+                               light_until_s=3)
+        # When the light comes back the first image is white.
+        self.assertGreaterEqual(len(live), len(truth) - 2)
+        self.assertNotIn("segment", self.log)
+        self.assertLess(largest_error(live, truth, live[0][0]), 0.03)
+
+    def test_turbid_water_leaves_a_fifth_of_the_contrast(self):
+        self.expect_whole(*self.fly("pool", "--frames", 80, veil=0.8), 0.05)
+
+    def test_nothing_is_claimed_where_nothing_can_be_seen(self):
+        result = self.fly("pool", "--frames", 40, code=FAILED, veil=0.97)
+        self.assertIn("no frame was tracked", result.stderr)
+
+    def test_blur_of_restless_motion_that_ends_in_a_halt(self):
+        flight = self.trajectory(lambda t: restless(t, 4.0), 7.0)
+        truth, live = self.fly("hall", *flight, auto_exposure="false", exposure_ms=20)
+        self.expect_whole(truth, live, 0.15)
+        still = [p for p in live if float(p[0]) > 1.6e9 + 5]
+        self.assertLess(largest_error(still, truth, still[0][0]), 0.005)
+
+    def test_turning_on_the_spot(self):
+        flight = self.trajectory(
+            lambda t: ([eased(t, 0, 2) + eased(t, 6, 8), 0, 0],
+                       turned(math.radians(80) * (eased(t, 2, 4) - eased(t, 4, 6)))), 8.0)
+        self.expect_whole(*self.fly("hall", *flight), 0.03)
+
+    def test_nothing_but_turning(self):
+        flight = self.trajectory(
+            lambda t: ([0, 0, 0], turned(math.radians(40) * math.sin(math.pi * t / 3))), 4.0)
+        self.expect_whole(*self.fly("hall", *flight), 0.02)
+
+    def test_rest_then_motion_then_rest(self):
+        seconds = 63.0 if LONG else 8.0
+        flight = self.trajectory(
+            lambda t: ([1.5 * eased(t, 0.5, 3), 0.8 * eased(t, 0.5, 3), 0], turned(0)), seconds)
+        truth, live = self.fly("hall", *flight)
+        self.expect_whole(truth, live, 0.01)
+        still = [p for p in live if float(p[0]) > 1.6e9 + 3.5]
+        self.assertLess(largest_error(still, truth, still[0][0]), 0.005)
+        # The scale that stereo depth gave at rest is kept until motion shows it.
+        corrections = [abs(float(v[1])) for v in self.verdicts]
+        self.assertLess(max(corrections), 0.02)
+        self.assertEqual({v[3] for v in self.verdicts} - {"accepted", "unobservable"}, set())
+
+
+if __name__ == "__main__":
+    harness.main()

@@ -93,29 +93,57 @@ def write_messages(path, messages):
         file.write(MAGIC)
 
 
+class _Cdr:
+    """Fields of a message in little-endian CDR, each aligned to its size."""
+
+    def __init__(self, data):
+        self.reader = _Reader(data[4:])
+
+    def number(self, kind="I"):
+        self.reader.at += -self.reader.at % struct.calcsize(kind)
+        return self.reader.take(kind)
+
+    def bytes(self):
+        return self.reader.bytes(self.number())
+
+    def text(self):
+        return self.bytes()[:-1].decode()
+
+    def stamp_ns(self):
+        return self.number("i") * 10**9 + self.number()
+
+
 Image = collections.namedtuple("Image", "stamp_ns frame_id height width encoding step data")
 
 
 def read_image(data):
-    """sensor_msgs/Image of little-endian CDR."""
-    r = _Reader(data[4:])
+    """sensor_msgs/Image."""
+    r = _Cdr(data)
+    stamp_ns, frame_id, height, width = r.stamp_ns(), r.text(), r.number(), r.number()
+    encoding = r.text()
+    r.number("B")  # is_bigendian
+    return Image(stamp_ns, frame_id, height, width, encoding, r.number(), r.bytes())
 
-    def align(size):
-        r.at += -r.at % size
 
-    def number():
-        align(4)
-        return r.take("I")
+StereoFrame = collections.namedtuple("StereoFrame", "stamp_ns session sequence left right")
+SideImage = collections.namedtuple("SideImage", "valid height width encoding step data")
 
-    def text():
-        return r.bytes(number())[:-1].decode()
 
-    seconds, nanoseconds = number(), number()
-    frame_id, height, width, encoding = text(), number(), number(), text()
-    r.take("B")  # is_bigendian
-    step = number()
-    return Image(seconds * 10**9 + nanoseconds, frame_id, height, width, encoding, step,
-                 r.bytes(number()))
+def read_stereo_frame(data):
+    """sovo_msgs/StereoFrame."""
+    r = _Cdr(data)
+
+    def side():
+        valid, height, width, encoding = r.number("?"), r.number(), r.number(), r.text()
+        step = r.number()
+        for kind in "ffqQ":  # exposure_s, gain_db, stamp_offset_ns, dropped
+            r.number(kind)
+        return SideImage(valid, height, width, encoding, step, r.bytes())
+
+    stamp_ns, _, session, sequence = r.stamp_ns(), r.text(), r.number("Q"), r.number("Q")
+    for kind in "Bdd":  # clock, stamp_sigma_s, pair_error_s
+        r.number(kind)
+    return StereoFrame(stamp_ns, session, sequence, side(), side())
 
 
 def write_image(image, order="<"):

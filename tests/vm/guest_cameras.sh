@@ -6,7 +6,7 @@ modprobe uvcvideo
 calibration 672 376 /tmp/vga.yaml
 calibration 1280 720 /tmp/hd.yaml
 # Programs come over a slow file system: read them before time matters.
-cat "$BIN/camera_check" "$BIN/emulated_zed" "$BIN/pattern_writer" >/dev/null
+cat "$BIN/camera_check" "$BIN/emulated_zed" "$BIN/loopback_writer" >/dev/null
 
 plug_in() {
   "$BIN/emulated_zed" 0 &
@@ -66,7 +66,7 @@ unplug
 
 begin loopback
 modprobe v4l2loopback devices=1 video_nr=20 card_label=Loop exclusive_caps=0 max_buffers=8
-"$BIN/pattern_writer" /dev/video20 2560 720 10 $((10 * SECONDS_EACH + 40)) &
+"$BIN/loopback_writer" /dev/video20 2560 720 10 $((10 * SECONDS_EACH + 40)) &
 WRITER=$!
 sleep 0.5
 "$BIN/camera_check" /tmp/hd.yaml $((8 * SECONDS_EACH)) $((60 * SECONDS_EACH)) device=/dev/video20 \

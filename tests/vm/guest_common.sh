@@ -1,9 +1,10 @@
-# Sourced by the scripts that run in the virtual machine. Each prints lines that the test reads:
+# Sourced by the scripts that run in the virtual machine. Each prints lines that its test reads:
 # "CASE name", then what its programs print.
 export PATH=/usr/sbin:/usr/bin:/sbin:/bin
-BIN=$(sed 's/.*bin=\([^ ]*\).*/\1/' /proc/cmdline)
-REPEATS=$(sed 's/.*repeats=\([^ ]*\).*/\1/' /proc/cmdline)
-SECONDS_EACH=$(sed 's/.*seconds=\([^ ]*\).*/\1/' /proc/cmdline)
+word() { sed "s/.* $1=\([^ ]*\).*/\1/" /proc/cmdline; }  # the value of KEY=VALUE
+BIN=$(word bin)
+REPEATS=$(word repeats)
+SECONDS_EACH=$(word seconds)
 export BIN REPEATS SECONDS_EACH
 
 begin() { printf '\nCASE %s\n' "$1"; }  # on a line of its own, whatever the console said

@@ -4,8 +4,10 @@
 #include <cstddef>
 #include <cstdint>
 
-#ifdef __SSE__
+#if defined(__SSE__)
 #include <xmmintrin.h>
+#elif defined(__aarch64__)
+#include <arm_neon.h>
 #endif
 
 #include "sovo/image/image.h"
@@ -38,8 +40,10 @@ inline Lane abs_lane(Lane v) {
   return reinterpret_cast<Lane>(reinterpret_cast<LaneMask>(v) & magnitude);
 }
 inline Lane sqrt_lane(Lane v) {
-#ifdef __SSE__
+#if defined(__SSE__)
   return _mm_sqrt_ps(v);
+#elif defined(__aarch64__)
+  return vsqrtq_f32(v);
 #else
   return Lane{std::sqrt(v[0]), std::sqrt(v[1]), std::sqrt(v[2]), std::sqrt(v[3])};
 #endif
@@ -72,17 +76,15 @@ inline Lane blend_lanes(const float* image, std::ptrdiff_t width, LaneMask offse
                         Lane fy) {
   // Two neighbours in a row are loaded as one double.
   using Pairs = double __attribute__((vector_size(16)));
-  Pairs upper[2];
-  Pairs lower[2];
-  for (std::size_t i = 0; i < kLanes; ++i) {
-    const float* pixel = image + offset[i];
-    __builtin_memcpy(reinterpret_cast<char*>(&upper[i / 2]) + 8 * (i % 2), pixel, 8);
-    __builtin_memcpy(reinterpret_cast<char*>(&lower[i / 2]) + 8 * (i % 2), pixel + width, 8);
-  }
-  const auto u0 = reinterpret_cast<Lane>(upper[0]);
-  const auto u1 = reinterpret_cast<Lane>(upper[1]);
-  const auto l0 = reinterpret_cast<Lane>(lower[0]);
-  const auto l1 = reinterpret_cast<Lane>(lower[1]);
+  const auto pair = [image](std::ptrdiff_t at) {
+    double two;
+    __builtin_memcpy(&two, image + at, sizeof(two));
+    return two;
+  };
+  const auto u0 = reinterpret_cast<Lane>(Pairs{pair(offset[0]), pair(offset[1])});
+  const auto u1 = reinterpret_cast<Lane>(Pairs{pair(offset[2]), pair(offset[3])});
+  const auto l0 = reinterpret_cast<Lane>(Pairs{pair(offset[0] + width), pair(offset[1] + width)});
+  const auto l1 = reinterpret_cast<Lane>(Pairs{pair(offset[2] + width), pair(offset[3] + width)});
   const Lane upper_left = __builtin_shufflevector(u0, u1, 0, 2, 4, 6);
   const Lane upper_right = __builtin_shufflevector(u0, u1, 1, 3, 5, 7);
   const Lane lower_left = __builtin_shufflevector(l0, l1, 0, 2, 4, 6);

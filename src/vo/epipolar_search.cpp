@@ -6,6 +6,7 @@
 
 #include "sovo/image/interpolation.h"
 #include "sovo/image/lanes.h"
+#include "sovo/vo/plain_product.h"
 
 namespace sovo {
 
@@ -48,7 +49,7 @@ TraceState finish(ImmaturePoint* p, TraceState state) {
 /// Determines the segment. Returns kUntraced when there is one to search.
 TraceState find_segment(const ImageF& image, const HostGeometry& g, const PointConfig& config,
                         const ImmaturePoint& p, Segment* s) {
-  s->ray = g.KRKi * Eigen::Vector3f(p.u, p.v, 1.0F);
+  s->ray = plain_product(g.KRKi, Eigen::Vector3f(p.u, p.v, 1.0F));
   const Eigen::Vector3f near_infinity = s->ray + g.Kt * p.rho_min;
   if (!(near_infinity.z() > 0.0F)) return TraceState::kOutOfView;
   s->u_min = near_infinity.x() / near_infinity.z();

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "sovo/image/lanes.h"
+#include "sovo/vo/plain_product.h"
 
 namespace sovo {
 
@@ -94,12 +95,12 @@ void project_pattern(const Window& window, int host, int target, const Point& po
   PatternProjection& out = *projection;
   out.rho = static_cast<float>(point.rho);
   const Eigen::Vector3f ray(point.u, point.v, 1.0F);
-  const Eigen::Vector3f frozen = g.frozen_RKi * ray + g.frozen_t * out.rho;
+  const Eigen::Vector3f frozen = plain_product(g.frozen_RKi, ray) + g.frozen_t * out.rho;
   out.iz = 1.0F / frozen.z();
   out.x = frozen.x() * out.iz;
   out.y = frozen.y() * out.iz;
 
-  const Eigen::Vector3f centre = g.KRKi * ray + g.Kt * out.rho;
+  const Eigen::Vector3f centre = plain_product(g.KRKi, ray) + g.Kt * out.rho;
   LaneMask inside = {-1, -1, -1, -1};
   for (std::size_t k = 0; k < 2; ++k) {
     const Lane pz = centre.z() + g.KRKi(2, 0) * kOffsetX[k] + g.KRKi(2, 1) * kOffsetY[k];

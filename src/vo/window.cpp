@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sovo/vo/plain_product.h"
+
 namespace sovo {
 
 BrightnessTransfer brightness_transfer(const Affine& host, double host_exposure,
@@ -77,8 +79,8 @@ void Window::update_geometry() {
       const SE3 T = target.T_camera_world * host.T_camera_world.inverse();
       g.RKi = (T.rotation_matrix() * K_inverse).cast<float>();
       g.t = T.translation().cast<float>();
-      g.KRKi = K * g.RKi;
-      g.Kt = K * g.t;
+      g.KRKi = plain_product(K, g.RKi);
+      g.Kt = plain_product(K, g.t);
       g.distance = T.translation().norm();
 
       const SE3 T0 = target.frozen_T_camera_world * host.frozen_T_camera_world.inverse();

@@ -1,0 +1,137 @@
+#include "support/same_bits.h"
+
+#include <gtest/gtest.h>
+
+#include "sovo/vo/coarse_tracker.h"
+#include "sovo/vo/normal_equations.h"
+#include "vo/window_test_support.h"
+
+namespace sovo {
+namespace {
+
+using namespace test;
+
+/// The small camera's view of nothing in particular.
+ImageF noise_view(unsigned seed) {
+  const CameraModel camera = small_camera();
+  return blurred(noise_image(camera.width, camera.height, seed));
+}
+
+/// A small motion, made without sine and cosine.
+SE3 plain_pose(int i) {
+  const double s = i;
+  return {SO3(Eigen::Quaterniond(1.0, 0.004 * s, -0.007 * s, 0.003 * s)),
+          Vec3(0.06 * s, -0.02 * s, 0.03 * s)};
+}
+
+Window noise_window() {
+  Window window(small_camera());
+  for (int i = 0; i < 3; ++i) {
+    Keyframe& k = window.insert(make_keyframe(
+        static_cast<std::uint32_t>(i), pyramid_of(noise_view(4)), plain_pose(i), {0.0, 1.5 * i}));
+    for (int v = 20; v < 136; v += 9) {
+      for (int u = 20; u < 188; u += 11) {
+        k.points.push_back(make_point(k.image(), u, v, 0.25 + 0.001 * (u + v)));
+      }
+    }
+  }
+  window.update_geometry();
+  return window;
+}
+
+void add_block(const LaneBlock& block, Checksum* sum) {
+  for (std::size_t half = 0; half < 2; ++half) {
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      for (std::size_t i = 0; i < 8; ++i) sum->add(float{block.H[i][half][k]});
+      sum->add(float{block.b[half][k]});
+    }
+  }
+}
+
+TEST(SameBits, LinearizationAndItsSums) {
+  const Window window = noise_window();
+  Checksum residual_sum;
+  HostSums sums;
+  sums.clear(window.size());
+  for (const Point& point : window[0].points) {
+    std::vector<TargetResidual> residuals;
+    DepthPart depth;
+    for (int target = 1; target < window.size(); ++target) {
+      LinearizedResidual r;
+      residual_sum.add(linearize(window, {}, 0, target, point, {.state = ResidualState::kIn}, &r));
+      if (r.state == ResidualState::kOutOfView) continue;
+      residual_sum.add(std::span(r.gram));
+      residual_sum.add(std::span(r.gram_r));
+      residual_sum.add(std::span(r.du));
+      residual_sum.add(std::span(r.dv));
+      residual_sum.add(std::span(r.cross));
+      depth.hessian += depth_part(r).hessian;
+      depth.gradient += depth_part(r).gradient;
+      residuals.push_back({target, r});
+    }
+    sums.add(residuals, static_cast<double>(depth.hessian), static_cast<double>(depth.gradient));
+  }
+  EXPECT_GT(sums.residuals(), 300);
+  EXPECT_EQ(residual_sum.value(), 0x7229fc204783c65aU);
+  Checksum block_sum;
+  for (int b = 1; b < window.size(); ++b) {
+    add_block(sums.top(b), &block_sum);
+    for (int a = 1; a <= b; ++a) add_block(sums.schur(a, b), &block_sum);
+  }
+  EXPECT_EQ(block_sum.value(), 0x9659306ab1450116U);
+}
+
+TEST(SameBits, TrackersNormalEquations) {
+  const ImageF image = noise_view(4);
+  TrackingReference reference;
+  reference.levels.resize(1);
+  ReferenceLevel& level = reference.levels[0];
+  level.camera = small_camera();
+  std::mt19937 random(4);
+  for (int i = 0; i < 1003; ++i) {
+    const int u = static_cast<int>(random() % static_cast<unsigned>(image.width()));
+    const int v = static_cast<int>(random() % static_cast<unsigned>(image.height()));
+    level.u.push_back(static_cast<float>(u));
+    level.v.push_back(static_cast<float>(v));
+    level.rho.push_back(static_cast<float>(random() % 1000U) / 1000.0F);
+    level.colour.push_back(image.at(u, v));
+  }
+  CoarseTracker tracker({});
+  const auto found = tracker.linearize(reference, 0, image, plain_pose(1), {1.01, -2.0}, 20.0);
+  EXPECT_GT(found.inliers, 300);
+  EXPECT_LT(found.inliers, found.in_view);
+  Checksum sum;
+  for (Eigen::Index i = 0; i < 8; ++i) {
+    for (Eigen::Index j = 0; j < 8; ++j) sum.add(found.H(i, j));
+    sum.add(found.b[i]);
+  }
+  sum.add(found.energy);
+  EXPECT_EQ(sum.value(), 0xf1a050d9d93b5fd0U);
+}
+
+TEST(SameBits, EpipolarSearch) {
+  const ImageF host = noise_view(4);
+  HostGeometry geometry;
+  geometry.KRKi << 1.01F, -0.02F, 0.7F, 0.015F, 0.99F, -0.4F, 1e-5F, -2e-5F, 1.0F;
+  geometry.Kt = {8.0F, -3.0F, 0.02F};
+  geometry.gain = 1.02F;
+  Checksum sum;
+  int good = 0;
+  for (int v = 20; v < 136; v += 7) {
+    for (int u = 20; u < 188; u += 7) {
+      ImmaturePoint p;
+      ASSERT_TRUE(
+          make_immature_point(host, static_cast<float>(u), static_cast<float>(v), 1, {}, 50.0, &p));
+      p.rho_min = 0.01F;
+      p.rho_max = 1.5F;
+      good += trace(host, geometry, {}, &p) == TraceState::kGood ? 1 : 0;
+      sum.add(static_cast<std::uint8_t>(p.state));
+      for (const float x : {p.rho_min, p.rho_max, p.quality, p.interval_px}) sum.add(x);
+    }
+  }
+  EXPECT_GT(good, 20);
+  EXPECT_EQ(sum.value(), 0xe900197f2dfec44eU);
+}
+
+}  // namespace
+}  // namespace sovo

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
 #include <utility>
 
 namespace sovo {
@@ -76,8 +77,12 @@ bool TwoViewInitializer::set_first(std::int64_t stamp_ns, ImagePyramidPtr pyrami
     candidates.push_back({static_cast<float>(p.x), static_cast<float>(p.y)});
   }
   tracker_.set_first(*first_, camera_, candidates);
-  reason_ = "no frame followed the first one";
-  return static_cast<int>(tracker_.tracks().size()) >= config_.min_matches;
+  const int patches = static_cast<int>(tracker_.tracks().size());
+  const bool enough = patches >= config_.min_matches;
+  reason_ = enough ? "no frame followed the first one"
+                   : "too little texture, only " + std::to_string(patches) +
+                         " patches of the image can be followed";
+  return enough;
 }
 
 TwoViewInitializer::Status TwoViewInitializer::track(std::int64_t stamp_ns,

@@ -82,6 +82,7 @@ class Robustness(SimTest):
     def test_nothing_is_claimed_where_nothing_can_be_seen(self):
         result = self.fly("pool", "--frames", 40, code=FAILED, veil=0.97)
         self.assertIn("no frame was tracked", result.stderr)
+        self.assertIn("INITIALIZING: beginning from two views: too little texture", result.stderr)
 
     def test_blur_of_restless_motion_that_ends_in_a_halt(self):
         flight = self.trajectory(lambda t: restless(t, 4.0), 7.0)

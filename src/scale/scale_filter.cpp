@@ -54,6 +54,7 @@ ScaleUpdate ScaleFilter::update(const ScaleMeasurement& m) {
   ScaleUpdate update;
   if (is_miss(m.estimate.verdict)) {
     update.verdict = m.estimate.verdict;
+    miss(m.estimate);
   } else if (m.cold_start) {
     update = update_cold(m);
   } else if (locked_) {
@@ -137,6 +138,11 @@ ScaleUpdate ScaleFilter::lock_on(const ScaleMeasurement& m, ScaleUpdate update, 
   return update;
 }
 
+void ScaleFilter::miss(const ScaleEstimate& estimate) {
+  out_of_view_ = estimate.out_of_view ? out_of_view_ + 1 : 0;
+  if (locked_ && out_of_view_ >= config_.cold_start_after) searching_ = true;
+}
+
 void ScaleFilter::disagree() {
   ++disagreements_;
   agreeing_ = 0;
@@ -159,6 +165,7 @@ void ScaleFilter::disagree_with(const ScaleUpdate& update, double variance) {
 void ScaleFilter::agree_again() {
   disagreements_ = 0;
   agreeing_ = 0;
+  out_of_view_ = 0;
   rejected_.reset();
 }
 

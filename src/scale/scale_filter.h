@@ -22,7 +22,8 @@ struct ScaleFilterConfig {
   double min_distance = 0.02;         ///< Distance counted at least, a keyframe [median depths].
   double learning_rate = 0.05;        ///< Of both noises from innovations; 0 holds them.
   double gate_sigmas = 3.0;           ///< Innovations beyond are confident disagreements.
-  int cold_start_after = 6;           ///< Disagreements in a row that ask for a cold start.
+  int cold_start_after = 6;           ///< Disagreements in a row that ask for a cold start, or
+                                      ///< keyframes whose points are all out of view.
   int cold_start_after_agreeing = 3;  ///< The same of such that agree with each other.
   double max_correlation = 0.85;      ///< Of measurements on keyframes that share all their points.
   double initial_sigma = 0.02;        ///< Floor of the sigma of a scale given by stereo depth.
@@ -75,7 +76,8 @@ struct ScaleUpdate {
 /// The gain fights lag: with constant drift e a keyframe the error stays at e (1 - K) / K. Before
 /// the first lock nothing is applied: it takes an accepted cold start, or two ambiguous ones that
 /// agree. Keyframes that cannot see the scale (too few points or disparities, no right image)
-/// count neither for nor against it.
+/// count neither for nor against it, unless it is for long this scale that puts the points outside
+/// the right image: then it is searched anew.
 class ScaleFilter {
  public:
   explicit ScaleFilter(const ScaleFilterConfig& config);
@@ -116,6 +118,7 @@ class ScaleFilter {
   void disagree();
   void disagree_with(const ScaleUpdate& update, double variance);
   void agree_again();
+  void miss(const ScaleEstimate& estimate);
   void learn(double innovation, double variance);
   double measured_variance(const ScaleMeasurement& m) const;
   bool within_gate(const ScaleUpdate& update) const;
@@ -130,7 +133,8 @@ class ScaleFilter {
   double measurement_factor_ = 1.0;
   double last_normalized_ = 0.0;  ///< Innovation over its standard deviation, the one before.
   int disagreements_ = 0;
-  int agreeing_ = 0;  ///< Of them, the newest that agree with each other.
+  int out_of_view_ = 0;  ///< Keyframes in a row whose points lie outside the right image.
+  int agreeing_ = 0;     ///< Of them, the newest that agree with each other.
   std::optional<Candidate> rejected_;
   std::int64_t accepted_stamp_ns_ = 0;
   ScaleVerdict last_verdict_ = ScaleVerdict::kTooFewPoints;

@@ -97,6 +97,7 @@ ScaleEstimate estimate_robust_scale(const Task& task, bool cold_start) {
   out.gain = static_cast<double>(alignment.brightness().gain);
   out.bias = static_cast<double>(alignment.brightness().bias);
   out.verdict = observability(config, alignment, size);
+  out.out_of_view = out.verdict == ScaleVerdict::kTooFewPoints && size >= config.min_points;
   if (!aligned && out.verdict == ScaleVerdict::kAccepted) out.verdict = ScaleVerdict::kUnobservable;
   if (out.verdict != ScaleVerdict::kAccepted) return out;
   const ScaleSums sums = alignment.sums();

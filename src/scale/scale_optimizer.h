@@ -108,6 +108,8 @@ struct ScaleEstimate {
   double inlier_ratio = 0.0;
   int iterations = 0;  ///< Over all levels.
   ScaleVerdict verdict = ScaleVerdict::kTooFewPoints;
+  /// There are points enough, but at this scale too few of them lie in the right image.
+  bool out_of_view = false;
 };
 
 class RightProjection;

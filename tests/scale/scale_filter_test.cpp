@@ -183,6 +183,21 @@ TEST(ScaleFilter, MissesCountNeitherForNorAgainst) {
   EXPECT_EQ(filter.last_verdict(), ScaleVerdict::kNoRightImage);
 }
 
+TEST(ScaleFilter, PointsThatAreLongOutsideTheRightImageAskForAColdStart) {
+  ScaleFilter filter = locked_filter();
+  ScaleMeasurement outside = measure(0.0, 0.0, false, ScaleVerdict::kTooFewPoints);
+  outside.estimate.out_of_view = true;
+  for (int round = 0; round < 3; ++round) {  // in a row, or it does not count
+    for (int i = 0; i < 5; ++i) EXPECT_FALSE(filter.update(outside).apply);
+    EXPECT_FALSE(filter.wants_cold_start());
+    filter.update(measure(0.0, 0.001));
+  }
+  for (int i = 0; i < 6; ++i) filter.update(outside);
+  EXPECT_TRUE(filter.wants_cold_start());
+  EXPECT_DOUBLE_EQ(filter.update(measure(1.6, 0.001, true)).log_scale_correction, 1.6);
+  EXPECT_FALSE(filter.wants_cold_start());
+}
+
 TEST(ScaleFilter, AgeCountsFromTheLastAcceptedKeyframe) {
   ScaleFilter filter = locked_filter();
   ScaleMeasurement m = measure(0.0, 0.001);

@@ -178,7 +178,21 @@ TEST(ScaleOptimizer, FewPointsAreRefused) {
   const StereoView& v = view(Right::kRectified);
   const auto keyframe = make_keyframe(v, scene(1), {.count = 150});
   EXPECT_EQ(estimate(v, keyframe, false).verdict, ScaleVerdict::kTooFewPoints);
+  EXPECT_FALSE(estimate(v, keyframe, false).out_of_view);
   EXPECT_EQ(estimate(v, keyframe, true).verdict, ScaleVerdict::kTooFewPoints);
+}
+
+TEST(ScaleOptimizer, ATooSmallMapLiesOutsideTheRightImageAndIsFoundAgain) {
+  const StereoView& v = view(Right::kRectified);
+  auto keyframe = make_keyframe(v, scene(1), {});
+  for (float& inverse_depth : keyframe.points.inverse_depth) inverse_depth *= 30.0F;
+  const ScaleEstimate tracked = estimate(v, keyframe, false);
+  EXPECT_EQ(tracked.verdict, ScaleVerdict::kTooFewPoints);
+  EXPECT_TRUE(tracked.out_of_view);
+  const ScaleEstimate searched = estimate(v, keyframe, true);
+  EXPECT_EQ(searched.verdict, ScaleVerdict::kAccepted);
+  EXPECT_FALSE(searched.out_of_view);
+  EXPECT_NEAR(searched.log_scale, std::log(30.0), 0.02);
 }
 
 TEST(ScaleOptimizer, PointsWithoutDepthAreLeftOut) {

@@ -44,7 +44,7 @@ class ArrivalClock {
 
  private:
   static constexpr int kImages = 15;
-  static constexpr std::int64_t kLongestNs = 500'000'000;
+  static constexpr std::int64_t kLongestNs = 2'000'000'000;
   int images_ = 0;
   std::int64_t begin_ns_ = 0;
   std::int64_t least_ns_ = 0;

@@ -50,8 +50,13 @@ bool DeviceClock::is_step(std::int64_t device_ns, double residual_s) {
   const bool agrees =
       odd_readings_ > 0 && std::abs(residual_s - odd_residual_s_) < 0.5 * config_.step_s;
   odd_readings_ = agrees ? odd_readings_ + 1 : 1;
-  if (!agrees) odd_residual_s_ = residual_s;
-  return odd_readings_ >= config_.step_readings;
+  if (!agrees) {
+    odd_residual_s_ = residual_s;
+    odd_since_ns_ = device_ns;
+  }
+  // Nothing arrives before it was stamped: early readings are no accident.
+  const double least_s = residual_s > 0.0 ? config_.late_step_s : 0.0;
+  return odd_readings_ >= config_.step_readings && seconds(device_ns - odd_since_ns_) >= least_s;
 }
 
 void DeviceClock::observe(std::int64_t device_ns, std::int64_t utc_ns) {

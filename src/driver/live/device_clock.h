@@ -10,6 +10,7 @@ struct DeviceClockConfig {
   int max_bins = 60;             ///< Length of the fit's window.
   double step_s = 0.05;          ///< Readings this far off the fit may be a step [s].
   int step_readings = 5;         ///< Readings in a row that make it one.
+  double late_step_s = 2.0;      ///< How long late ones must go on for it: a busy host is late too.
   double max_drift = 1e-3;       ///< No crystal is worse; a larger slope is not believed.
   double first_sigma_s = 1e-3;   ///< Uncertainty until the spread of the readings is known [s].
   double sigma_floor_s = 10e-6;  ///< Uncertainty that no data removes [s].
@@ -22,7 +23,7 @@ struct DeviceClockConfig {
 /// the median of the slopes between bins (Theil-Sen), the offset a low quartile above it. A clock
 /// that was set, on either side, shows as readings in a row that agree with each other and not with
 /// the fit: it is then made anew and counted. Late readings after a stall of the host do not agree
-/// with each other and are let pass.
+/// with each other and are let pass; those of a busy host may agree, but not for long.
 class DeviceClock {
  public:
   explicit DeviceClock(const DeviceClockConfig& config = {});
@@ -67,6 +68,7 @@ class DeviceClock {
   double mean_delay_s_ = 0.0;  ///< Of the readings over the fit, as long as there are few bins.
   int odd_readings_ = 0;       ///< In a row, off the fit by about `odd_residual_s_`.
   double odd_residual_s_ = 0.0;
+  std::int64_t odd_since_ns_ = 0;  ///< Device time of the first of them.
   std::uint64_t steps_ = 0;
 };
 

@@ -114,6 +114,7 @@ LiveCamera make_camera(const std::string& name, const Probe& probe, const Captur
   // Both clocks are this machine's and read together: a difference is no delay.
   camera.config.clock.step_s = 1e-3;
   camera.config.clock.step_readings = 1;
+  camera.config.clock.late_step_s = 0.0;
   camera.config.clock.first_sigma_s = 50e-6;
   const auto finder = std::make_shared<DeviceFinder>(probe.wish);
   camera.open = [finder, capture]() -> Result<std::unique_ptr<CaptureDevice>> {

@@ -99,5 +99,20 @@ TEST(DeviceClock, AStalledHostIsNoStep) {
   EXPECT_LT(std::abs(clock.to_utc(t) - device.utc(t)), 400'000);
 }
 
+TEST(DeviceClock, ABusyHostIsNoStep) {
+  DeviceClock clock;
+  Device device;
+  for (int n = 0; n < 600; ++n) {
+    const std::int64_t t = n * 33'333'333LL;
+    // For a second and a half every reading is late, and all by about the same.
+    const std::int64_t late = n >= 300 && n < 345 ? 80'000'000 : 200'000;
+    clock.observe(t, device.utc(t) + late + device.late_ns() / 10);
+    if (n > 60) {
+      EXPECT_LT(std::abs(clock.to_utc(t) - device.utc(t)), 1'000'000) << n;
+    }
+  }
+  EXPECT_EQ(clock.steps(), 0U);
+}
+
 }  // namespace
 }  // namespace sovo

@@ -94,6 +94,7 @@ struct WindowConfig {
   double folding_weight = 0.25;  ///< Of marginalized points' Hessians: pattern pixels correlate.
   double damping = 1e-5;
   double depth_damping = 100.0;            ///< Added to H_rho * mean_rho^2 of every point.
+  double min_parallax = 2.0;               ///< Below it stereo depths stand against steps [px].
   double stop_threshold = 1.2;             ///< Times the step norms below which iteration stops.
   double prior_a = 1e4;                    ///< Weight of the prior on each frame's log-gain.
   double prior_b = 1.0;                    ///< The same for the bias.
@@ -111,6 +112,8 @@ struct WindowConfig {
     v("damping", damping, "smallest Levenberg-Marquardt damping");
     v("depth_damping", depth_damping,
       "added to the information on a point's log-depth: what no parallax shows stays as it is");
+    v("min_parallax", min_parallax,
+      "with less, what a stereo match tells of a point's depth damps its steps [px]");
     v("stop_threshold", stop_threshold, "iteration stops below this x the step thresholds");
     v("prior_a", prior_a, "weight of the prior on each frame's log-gain");
     v("prior_b", prior_b, "weight of the prior on each frame's bias");

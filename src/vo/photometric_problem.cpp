@@ -59,14 +59,16 @@ std::vector<Vec8> relative_displacements(const Window& window, const VecX& x) {
 PhotometricProblem::PhotometricProblem(const WindowConfig& config, std::vector<PointRef> points,
                                        Window* window, WorkerPool* pool)
     : config_(config),
-      depth_damping_(config.depth_damping / std::pow(window->mean_inverse_depth(), 2)),
       points_(std::move(points)),
       window_(window),
       pool_(pool) {
   first_.reserve(points_.size() + 1);
   first_.push_back(0);
+  damping_.reserve(points_.size());
+  const double depth_damping = config.depth_damping / std::pow(window->mean_inverse_depth(), 2);
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const PointRef& ref = points_[i];
+    add_damping(ref, depth_damping);
     std::size_t count = 0;
     for (const Residual& r : ref.point->residuals) {
       count += r.state != ResidualState::kAbsent ? 1 : 0;
@@ -79,6 +81,22 @@ PhotometricProblem::PhotometricProblem(const WindowConfig& config, std::vector<P
     blocks_.back().end = i + 1;
   }
   sums_.resize(blocks_.size());
+}
+
+/// A pixel of parallax or less is lost in blur, and in what else moves all points of an image alike:
+/// there the depth that stereo gave is the better one, and keeps its weight.
+void PhotometricProblem::add_damping(const PointRef& ref, double depth_damping) {
+  double baseline = 0.0;
+  for (int t = 0; t < window_->size(); ++t) {
+    const auto slot = static_cast<std::size_t>((*window_)[t].slot);
+    if (ref.point->residuals[slot].state != ResidualState::kAbsent) {
+      baseline = std::max(baseline, window_->pair(ref.host, t).distance);
+    }
+  }
+  const double parallax = window_->camera().fx * baseline * ref.point->rho;
+  const bool unseen = parallax < config_.min_parallax;
+  damping_.push_back(depth_damping +
+                     (unseen ? static_cast<double>(ref.point->static_information) : 0.0));
 }
 
 WindowLinearization PhotometricProblem::stored() const {
@@ -146,7 +164,7 @@ void PhotometricProblem::linearize_block(const Block& block, const WindowLineari
       out->depths[i] = depth;
       if (request.system) {
         // What is folded into the prior is the information as it is.
-        const double hessian = request.at_frozen_poses ? depth.hessian : damped(depth.hessian);
+        const double hessian = depth.hessian + (request.at_frozen_poses ? 0.0 : damping_[i]);
         sums->add({residuals.data(), count}, hessian, depth.gradient);
       }
     }
@@ -212,7 +230,7 @@ void PhotometricProblem::step_depths(const WindowLinearization& at, const VecX& 
         b += static_cast<double>(sum_lane(load_lane(&r.cross[0]) * load_lane(&step[0]) +
                                           load_lane(&r.cross[4]) * load_lane(&step[4])));
       }
-      points_[i].point->rho -= b / (damped(depth.hessian) * (1.0 + lambda));
+      points_[i].point->rho -= b / ((depth.hessian + damping_[i]) * (1.0 + lambda));
     }
   }
 }

@@ -100,14 +100,15 @@ class PhotometricProblem {
     int host = 0;
     std::size_t begin = 0, end = 0;  ///< Points.
   };
-  /// What a solver divides by: without parallax the step of a depth is otherwise noise over noise.
-  double damped(double hessian) const { return hessian + depth_damping_; }
+  void add_damping(const PointRef& ref, double depth_damping);
   void linearize_block(const Block& block, const WindowLinearization& known, const Request& request,
                        WindowLinearization* out, HostSums* sums, double* energy) const;
 
   WindowConfig config_;
-  double depth_damping_;  ///< [m^2]
   std::vector<PointRef> points_;
+  /// Added to a point's H_rho where its depth is solved for [m^2]: without parallax a step would be
+  /// noise over noise.
+  std::vector<double> damping_;
   Window* window_;
   WorkerPool* pool_;
   std::vector<std::size_t> first_;  ///< First residual of each point, and one past the last.

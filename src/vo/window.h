@@ -53,7 +53,7 @@ struct Point {
   double rho = 0.0;                          ///< Inverse depth, current estimate [1/m].
   double hessian = 0.0;             ///< H_rho_rho of the newest linearization, without priors.
   double gradient = 0.0;            ///< b_rho.
-  float static_information = 0.0F;  ///< As `hessian`, of a stereo match of the host; 0: none.
+  float static_information = 0.0F;  ///< As `hessian`, of the match that gave rho first; 0: none.
   float relative_baseline = 0.0F;   ///< Largest baseline * rho of its good residuals.
   int good_residuals = 0;           ///< Inlier residuals on record, counted at every keyframe.
   bool remove = false;

@@ -7,7 +7,8 @@ import subprocess
 import harness
 import mcap_bag
 from bus_test import FRAMES, TRUTH, BusTest
-from harness import BAD_INPUT, DATASET, OK, ROOT, USAGE, CommandTest, largest_error, read_tum, sovo
+from harness import (BAD_INPUT, DATASET, OK, ROOT, SMALL_RIG, USAGE, CommandTest, largest_error,
+                     read_tum, sovo)
 
 LEFT, RIGHT = "/sovo/left/", "/sovo/right/"
 
@@ -203,10 +204,8 @@ class GoldenDives(BagTest):
 
     def dive(self, name):
         world, frames = self.DIVES[name]
-        calibration = self.folder / "small.yaml"
-        calibration.write_text((ROOT / "tests/app/golden/small.yaml").read_text())
         dataset = self.folder / (name + "_dataset")
-        self.expect(sovo("camera", "sim", "--world", world, "--calib", calibration, "--frames",
+        self.expect(sovo("camera", "sim", "--world", world, "--calib", SMALL_RIG, "--frames",
                          frames, "--export", dataset), OK)
         return self.convert(dataset, name + ".mcap")
 

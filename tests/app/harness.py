@@ -12,6 +12,7 @@ from trajectory import largest_error, read_tum, rotate_back  # noqa: F401
 SOVO = os.environ["SOVO"]
 DATASET = os.environ["SOVO_SYNTHETIC"]
 ROOT = pathlib.Path(os.environ["SOVO_ROOT"])
+SMALL_RIG = ROOT / "tests/app/golden/small.yaml"  # 320x200, quick to render
 SHARED = pathlib.Path(os.environ.get("SOVO_SHARED", ROOT / ".." / "shared"))
 
 OK, FAILED, USAGE, BAD_INPUT = 0, 1, 2, 3

@@ -111,6 +111,57 @@ TEST(BundleAdjustment, ConvergesToTheTruthUpToScale) {
   EXPECT_LT(errors[errors.size() * 9 / 10], 0.04);
 }
 
+/// Two keyframes of a camera that has moved by `step` [m] along x, the second one blurred by more;
+/// depths are true, and each has a stereo match with this deviation of the log-depth.
+Window two_keyframes(double step, double relative_sigma) {
+  const SyntheticScene scene(3);
+  const CameraModel camera = small_camera();
+  const std::vector<SE3> poses{SE3(), SE3(SO3(), Vec3(step, 0.0, 0.0))};
+  Window window(camera);
+  const ImagePyramidPtr first = scene_view(scene, camera, poses[0]);
+  const ImageF sharp = scene_view(scene, camera, poses[1])->level(0);
+  window.insert(make_keyframe(0, first, poses[0])).points =
+      scene_points(scene, camera, first->level(0), poses, 0, 6);
+  window.insert(make_keyframe(1, pyramid_of(blurred(blurred(sharp))), poses[1]));
+  for (Point& p : window[0].points) {
+    p.residuals[static_cast<std::size_t>(window[1].slot)].state = ResidualState::kIn;
+    const double sigma = relative_sigma * p.rho;
+    p.static_information = static_cast<float>(100.0 / (sigma * sigma));
+  }
+  window.update_geometry();
+  return window;
+}
+
+/// Inverse depths after bundle adjustment, relative to those before.
+std::vector<double> moved_depths(Window window) {
+  std::vector<double> before;
+  for (const Point& p : window[0].points) before.push_back(p.rho);
+  WorkerPool pool(1);
+  (void)BundleAdjuster(WindowConfig(), &pool).optimize(&window);
+  std::vector<double> ratios;
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    ratios.push_back(window[0].points[i].rho / before[i]);
+  }
+  return ratios;
+}
+
+double worst_change(const std::vector<double>& ratios) {
+  double worst = 0.0;
+  for (const double r : ratios) worst = std::max(worst, std::abs(r - 1.0));
+  return worst;
+}
+
+TEST(BundleAdjustment, WithoutParallaxTheDepthsOfStereoStay) {
+  const double unknown = worst_change(moved_depths(two_keyframes(0.004, 1e9)));
+  const double known = worst_change(moved_depths(two_keyframes(0.004, 0.01)));
+  EXPECT_GT(unknown, 0.2);
+  EXPECT_LT(known, 0.02);
+}
+
+TEST(BundleAdjustment, WithParallaxStereoHasNoSay) {
+  EXPECT_EQ(moved_depths(two_keyframes(0.3, 1e9)), moved_depths(two_keyframes(0.3, 0.01)));
+}
+
 TEST(BundleAdjustment, NumberOfThreadsChangesNoBit) {
   std::vector<std::vector<double>> states;
   for (const int threads : {1, 2}) {

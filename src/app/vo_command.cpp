@@ -10,6 +10,7 @@
 #include "sovo/app/odometry_session.h"
 #include "sovo/app/stop_signal.h"
 #include "sovo/bridge/command_subscriber.h"
+#include "sovo/bridge/replay_clock.h"
 #include "sovo/bridge/ros_stereo_subscriber.h"
 #include "sovo/bridge/stereo_subscriber.h"
 #include "sovo/bridge/vo_publisher.h"
@@ -24,10 +25,12 @@ using Clock = std::chrono::steady_clock;
 class VoProcess {
  public:
   VoProcess(const AppConfig& config, bridge::StereoFeed& source,
-            bridge::CommandSubscriber& commands, bridge::VoPublisher& publisher)
+            bridge::CommandSubscriber& commands, bridge::ReplayClock& replay_clock,
+            bridge::VoPublisher& publisher)
       : config_(config),
         source_(source),
         commands_(commands),
+        replay_clock_(replay_clock),
         publisher_(publisher),
         session_(config, source.cameras(), {&publisher}, {publisher.timings()}) {
     publisher.set_cameras(session_.tracked_camera(), source.cameras().rig.left);
@@ -72,6 +75,7 @@ class VoProcess {
     ++taken_;
     follow_session(frame);
     camera_frame_ = frame.frame_id;
+    if (auto heard = replay_clock_.update(); !heard) spdlog::warn("{}", heard.error());
     publisher_.set_feed(feed());
     if (paused_) {
       publisher_.on_frame(paused_output(frame));
@@ -105,7 +109,7 @@ class VoProcess {
     feed.rejected = counters.rejected + counters.foreign;
     feed.last_command_id = commands_.last_id();
     feed.last_command_result = commands_.last_result();
-    feed.latency_origin_ns = source_.latency_origin_ns();
+    feed.latency_origin_ns = source_.latency_origin_ns() + replay_clock_.lag_ns().value_or(0);
     feed.camera_frame = camera_frame_;
     return feed;
   }
@@ -162,6 +166,7 @@ class VoProcess {
   const AppConfig& config_;
   bridge::StereoFeed& source_;
   bridge::CommandSubscriber& commands_;
+  bridge::ReplayClock& replay_clock_;
   bridge::VoPublisher& publisher_;
   OdometrySession session_;
   bool paused_ = false;
@@ -229,6 +234,8 @@ int run(const AppConfig& config) {
   if (!source) return fail(kFailed, source.error());
   auto commands = bridge::CommandSubscriber::open(*participant);
   if (!commands) return fail(kFailed, commands.error());
+  auto replay_clock = bridge::ReplayClock::open(*participant);
+  if (!replay_clock) return fail(kFailed, replay_clock.error());
   if (!wait_for_calibration(**source, stop)) {
     return fail(kFailed, "stopped before a calibration came; no frame was tracked");
   }
@@ -241,7 +248,7 @@ int run(const AppConfig& config) {
   spdlog::info("tracking frames of {}", config.node.left.empty()
                                             ? participant->topic("stereo")
                                             : config.node.left + " and " + config.node.right);
-  return VoProcess(config, **source, *commands, **publisher).run(stop);
+  return VoProcess(config, **source, *commands, *replay_clock, **publisher).run(stop);
 }
 
 }  // namespace

@@ -1,6 +1,5 @@
 #include "sovo/bridge/image_pairer.h"
 
-#include <memory>
 #include <utility>
 
 #include "sovo/bridge/cdr_codec.h"
@@ -19,14 +18,7 @@ Result<SideImage> decompressed(const msg::CompressedImage& message, const std::s
   }
   auto image = decode_grey_image({message.data._buffer, message.data._length});
   if (!image) return Error{name + ": " + image.error()};
-  SideImage side;
-  side.valid = true;
-  side.width = image->width;
-  side.height = image->height;
-  side.format = image->format;
-  side.step = image->step();
-  side.data = std::make_shared<const std::vector<std::uint8_t>>(std::move(image->data));
-  return side;
+  return to_side(std::move(*image));
 }
 
 Result<SideImage> side_of(const msg::Image& message, const std::string& name) {

@@ -5,6 +5,8 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <memory>
+#include <utility>
 
 #include "sovo/io/image_codecs.h"
 
@@ -83,6 +85,17 @@ Result<GreyImage> read_grey_image(const std::string& path) {
   auto image = decode_grey_image(*bytes);
   if (!image) return Error{path + ": " + image.error()};
   return image;
+}
+
+SideImage to_side(GreyImage image) {
+  SideImage side;
+  side.valid = true;
+  side.width = image.width;
+  side.height = image.height;
+  side.format = image.format;
+  side.step = image.step();
+  side.data = std::make_shared<const std::vector<std::uint8_t>>(std::move(image.data));
+  return side;
 }
 
 Result<void> write_png(const std::string& path, const GreyImage& image) {

@@ -29,6 +29,9 @@ Result<GreyImage> decode_grey_image(std::span<const std::uint8_t> bytes);
 /// Reads and decodes a file; the error names the file and the reason.
 Result<GreyImage> read_grey_image(const std::string& path);
 
+/// The image as one side of a pair.
+SideImage to_side(GreyImage image);
+
 /// Writes an 8- or 16-bit grey PNG; the error names the file and the reason.
 Result<void> write_png(const std::string& path, const GreyImage& image);
 

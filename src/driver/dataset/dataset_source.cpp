@@ -23,13 +23,7 @@ Result<SideImage> load_side(const ImageRef& ref, const CameraModel& camera) {
     return Error{ref.path.string() + ": the image is " + size_text(image->width, image->height) +
                  " pixels, the calibration is for " + size_text(camera.width, camera.height)};
   }
-  SideImage side;
-  side.valid = true;
-  side.width = image->width;
-  side.height = image->height;
-  side.format = image->format;
-  side.step = image->step();
-  side.data = std::make_shared<const std::vector<std::uint8_t>>(std::move(image->data));
+  SideImage side = to_side(std::move(*image));
   side.exposure_s = ref.exposure_s;
   return side;
 }

@@ -223,15 +223,18 @@ void expect_colour(const msg::Image& m, const SideImage& luma) {
   ASSERT_EQ(m.data._length, 3 * luma.data->size());
   double worst_luma = 0.0;
   double worst_red = 0.0;
+  double worst_blue = 0.0;
   for (std::size_t i = 0; i < luma.data->size(); ++i) {
     const std::uint8_t* c = m.data._buffer + 3 * i;
     const double level = (*luma.data)[i];
     const double seen = 0.299 * c[0] + 0.587 * c[1] + 0.114 * c[2];
     worst_luma = std::max(worst_luma, std::abs(seen - level));
     worst_red = std::max(worst_red, std::abs(c[0] - level - 1.402 * (ColourCamera::kV - 128)));
+    worst_blue = std::max(worst_blue, std::abs(c[2] - level - 1.772 * (ColourCamera::kU - 128)));
   }
-  EXPECT_LT(worst_luma, 2.0);
-  EXPECT_LT(worst_red, 2.0);
+  EXPECT_LT(worst_luma, 1.0);
+  EXPECT_LT(worst_red, 1.0);
+  EXPECT_LT(worst_blue, 1.0);
 }
 
 TEST(CameraViews, ColourIsTheFramesOwnOnBothSides) {

@@ -79,11 +79,13 @@ class LivePublication {
     const std::uint64_t session = new_session();
     std::uint64_t published = 0;
     while (!stop_.requested() && (most == 0 || published < static_cast<std::uint64_t>(most))) {
+      source_.want_colour(publisher_.wants_colour());
       SourceResult next = source_.next(std::chrono::milliseconds(100));
       tell();
       if (next.state != SourceState::kFrame) continue;
       next.frame.session = session;
-      if (auto sent = publisher_.publish(next.frame); !sent) return fail(kFailed, sent.error());
+      const auto sent = publisher_.publish(next.frame, source_.colour());
+      if (!sent) return fail(kFailed, sent.error());
       ++published;
     }
     log_summary(source_.report());

@@ -68,11 +68,11 @@ Result<void> CameraPublisher::publish_static(const Participant& participant,
   return tf_static_.write(message);
 }
 
-Result<void> CameraPublisher::publish(const StereoFrame& frame) {
+Result<void> CameraPublisher::publish(const StereoFrame& frame, const StereoColour& colour) {
   msg::StereoFrame message = to_message(frame);
   if (frame.frame_id.empty()) message.header.frame_id = borrow(left_frame_);
   auto written = stereo_.write(message);
-  views_->offer(frame);
+  views_->offer(frame, colour);
   return written;
 }
 

@@ -26,8 +26,11 @@ class CameraPublisher {
                                       std::int64_t stamp_ns);
 
   /// Publishes a frame; its empty `frame_id` becomes the left optical frame of this publisher.
-  /// Pixels are serialized from where they lie.
-  Result<void> publish(const StereoFrame& frame);
+  /// Pixels are serialized from where they lie. `colour`: of the frame, where it was kept.
+  Result<void> publish(const StereoFrame& frame, const StereoColour& colour = {});
+
+  /// Whether frames should come with their colour: somebody reads it.
+  bool wants_colour() const { return views_->wants_colour(); }
 
   /// Left optical frame, e.g. "cam_left_camera_optical_frame".
   const std::string& left_optical_frame() const { return left_frame_; }

@@ -30,6 +30,7 @@ constexpr int kPreviewQuality = 75;
 struct CameraViews::Side {
   Writer<msg::Image> raw;
   Writer<msg::Image> rect;
+  Writer<msg::Image> color;
   Writer<msg::CameraInfo> info;
   Writer<msg::CompressedImage> compressed;
   Writer<msg::CompressedImage> preview;
@@ -51,13 +52,18 @@ struct CameraViews::Side {
   static Result<std::unique_ptr<Side>> open(const Participant& participant,
                                             const std::string& name);
   void show(const SideImage& side, std::int64_t stamp_ns, bool preview_due, bool small_due);
+  /// Only of a frame that has colour, and while somebody reads it.
+  void show_colour(const SideImage& side, const ColourImage& colour, std::int64_t stamp_ns,
+                   ColourReader* reader);
 
  private:
   Side(Writer<msg::Image> raw_writer, Writer<msg::Image> rect_writer,
-       Writer<msg::CameraInfo> info_writer, Writer<msg::CompressedImage> compressed_writer,
-       Writer<msg::CompressedImage> preview_writer, Writer<msg::CompressedImage> small_writer)
+       Writer<msg::Image> color_writer, Writer<msg::CameraInfo> info_writer,
+       Writer<msg::CompressedImage> compressed_writer, Writer<msg::CompressedImage> preview_writer,
+       Writer<msg::CompressedImage> small_writer)
       : raw(std::move(raw_writer)),
         rect(std::move(rect_writer)),
+        color(std::move(color_writer)),
         info(std::move(info_writer)),
         compressed(std::move(compressed_writer)),
         preview(std::move(preview_writer)),
@@ -71,10 +77,15 @@ struct CameraViews::Side {
 
 Result<std::unique_ptr<CameraViews::Side>> CameraViews::Side::open(const Participant& participant,
                                                                    const std::string& name) {
-  auto raw = Writer<msg::Image>::open(participant, name + topics::kImageRaw, topics::kImageQos);
+  const auto open_image = [&](const char* topic) {
+    return Writer<msg::Image>::open(participant, name + topic, topics::kImageQos);
+  };
+  auto raw = open_image(topics::kImageRaw);
   if (!raw) return raw.failure();
-  auto rect = Writer<msg::Image>::open(participant, name + topics::kImageRect, topics::kImageQos);
+  auto rect = open_image(topics::kImageRect);
   if (!rect) return rect.failure();
+  auto color = open_image(topics::kImageColor);
+  if (!color) return color.failure();
   auto info =
       Writer<msg::CameraInfo>::open(participant, name + topics::kCameraInfo, topics::kImageQos);
   if (!info) return info.failure();
@@ -87,9 +98,9 @@ Result<std::unique_ptr<CameraViews::Side>> CameraViews::Side::open(const Partici
   if (!preview) return preview.failure();
   auto small = open_compressed(topics::kPreviewSmall);
   if (!small) return small.failure();
-  return std::unique_ptr<Side>(new Side(std::move(*raw), std::move(*rect), std::move(*info),
-                                        std::move(*compressed), std::move(*preview),
-                                        std::move(*small)));
+  return std::unique_ptr<Side>(new Side(std::move(*raw), std::move(*rect), std::move(*color),
+                                        std::move(*info), std::move(*compressed),
+                                        std::move(*preview), std::move(*small)));
 }
 
 void CameraViews::Side::compress(const GreyView& image, int quality, const msg::Header& header,
@@ -144,6 +155,23 @@ void CameraViews::Side::show(const SideImage& side, std::int64_t stamp_ns, bool 
   }
 }
 
+void CameraViews::Side::show_colour(const SideImage& side, const ColourImage& colour,
+                                    std::int64_t stamp_ns, ColourReader* reader) {
+  if (!side.valid || !colour.bytes || color.num_readers() == 0) return;
+  if (!reader->read(colour, &made_image)) {
+    ++failed;
+    return;
+  }
+  msg::Image m{};
+  m.header = {to_message(stamp_ns), borrow(frame_id)};
+  m.width = static_cast<std::uint32_t>(colour.columns);
+  m.height = static_cast<std::uint32_t>(colour.height);
+  m.encoding = borrow("rgb8");
+  m.step = 3 * m.width;
+  borrow(m.data, made_image);
+  check(color.write(m));
+}
+
 CameraViews::CameraViews(Writer<msg::DiagnosticArray> diagnostics, CameraHealth health)
     : preview_pace_(200ms),
       small_pace_(500ms),
@@ -179,14 +207,14 @@ Result<std::unique_ptr<CameraViews>> CameraViews::open(const Participant& partic
   return views;
 }
 
-void CameraViews::offer(const StereoFrame& frame) {
+void CameraViews::offer(const StereoFrame& frame, const StereoColour& colour) {
   {
     const std::lock_guard lock(mutex_);
     if (queue_.size() >= kMostWaiting) {
       queue_.pop_front();
       ++skipped_;
     }
-    queue_.push_back(frame);
+    queue_.push_back({frame, colour});
   }
   worker_->wake();
 }
@@ -201,16 +229,18 @@ ViewCounters CameraViews::counters() const {
 }
 
 void CameraViews::work() {
+  wants_colour_ = left_->color.num_readers() > 0 || right_->color.num_readers() > 0;
+  if (!wants_colour_) colour_reader_ = {};  // gives its memory back
   while (true) {
-    StereoFrame frame;
+    Offered offered;
     {
       const std::lock_guard lock(mutex_);
       if (queue_.empty()) break;
-      frame = std::move(queue_.front());
+      offered = std::move(queue_.front());
       queue_.pop_front();
     }
-    health_.add(frame, Pace::Clock::now());
-    show(frame);
+    health_.add(offered.frame, Pace::Clock::now());
+    show(offered);
   }
   if (diagnostics_pace_.due()) show_diagnostics();
 }
@@ -225,12 +255,15 @@ void CameraViews::show_diagnostics() {
   if (!diagnostics_.write(message.message())) ++left_->failed;
 }
 
-void CameraViews::show(const StereoFrame& frame) {
+void CameraViews::show(const Offered& offered) {
+  const StereoFrame& frame = offered.frame;
   const auto now = Pace::Clock::now();
   const bool preview_due = preview_pace_.due(now);
   const bool small_due = small_pace_.due(now);
   left_->show(frame.left, frame.stamp_ns, preview_due, small_due);
   right_->show(frame.right, frame.stamp_ns, preview_due, small_due);
+  left_->show_colour(frame.left, offered.colour.left, frame.stamp_ns, &colour_reader_);
+  right_->show_colour(frame.right, offered.colour.right, frame.stamp_ns, &colour_reader_);
 }
 
 }  // namespace sovo::bridge

@@ -30,6 +30,12 @@ std::string uncompressed(const std::string& topic) {
   return topic.substr(0, topic.size() - std::string(kCompressed).size());
 }
 
+/// Whether the last word of the topic says that its images are in colour.
+bool is_coloured(const std::string& image_topic) {
+  const std::string image = uncompressed(image_topic);
+  return image.substr(image.rfind('/') + 1).find("color") != std::string::npos;
+}
+
 bool is_image(const RecordedTopic& topic) {
   return topic.messages > 0 && (topic.type == MessageTraits<msg::Image>::kRosName ||
                                 topic.type == MessageTraits<msg::CompressedImage>::kRosName);
@@ -109,12 +115,12 @@ Result<ImageTopics> find_image_topics(const Recording& recording, const std::str
     if (!right_name) return right_name.failure();
     return ImageTopics{*left_name, *right_name};
   }
-  using Rank = std::tuple<bool, bool, bool>;  // the smallest is the best
+  using Rank = std::tuple<bool, bool, bool, bool>;  // the smallest is the best
   std::vector<ImageTopics> best;
   Rank best_rank;
   for (const ImageTopics& pair : named_pairs(recording)) {
     const Rank rank = {!has_infos(recording, pair), is_compressed(pair.left),
-                       is_rectified(pair.left)};
+                       is_rectified(pair.left), is_coloured(pair.left)};
     if (best.empty() || rank < best_rank) {
       best.clear();
       best_rank = rank;

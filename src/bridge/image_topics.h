@@ -26,9 +26,8 @@ struct ImageTopics {
 
 /// The stereo pair of a recording with Image or CompressedImage topics. `left` and `right` name
 /// them in full or by how they end; empty: they are found by their names (left and right, cam0 and
-/// cam1,
-/// ...), those that have camera_info first, then raw before compressed and rectified ones. The
-/// error names what there is to choose from.
+/// cam1, ...), those that have camera_info first, then raw before compressed, rectified and
+/// coloured ones. The error names what there is to choose from.
 Result<ImageTopics> find_image_topics(const Recording& recording, const std::string& left,
                                       const std::string& right);
 

@@ -20,7 +20,7 @@ CatalogTopic on_demand(const std::string& name, const TopicQos& qos) {
 
 void add_side(const std::string& side, std::vector<CatalogTopic>* catalog) {
   catalog->push_back(topic<msg::CameraInfo>(side + "/camera_info", reliable(4)));
-  for (const char* image : {"/image_raw", "/image_rect"}) {
+  for (const char* image : {"/image_raw", "/image_rect", "/image_color"}) {
     catalog->push_back(on_demand<msg::Image>(side + image, reliable(4)));
   }
   for (const char* image : {"/image_raw", "/preview", "/preview_small"}) {

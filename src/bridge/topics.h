@@ -13,6 +13,7 @@ inline constexpr TopicQos kCalibrationQos = latched(1);
 // Below left/ and right/ of a camera.
 inline constexpr char kImageRaw[] = "image_raw";
 inline constexpr char kImageRect[] = "image_rect";
+inline constexpr char kImageColor[] = "image_color";
 inline constexpr char kCameraInfo[] = "camera_info";
 inline constexpr TopicQos kImageQos = reliable(4);
 inline constexpr char kImageCompressed[] = "image_raw/compressed";

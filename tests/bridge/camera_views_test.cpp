@@ -163,6 +163,138 @@ TEST(CameraViews, RectifiedImagesHaveTheSizeOfTheRawOnes) {
   });
 }
 
+/// A camera process with a source that has colour: UYVY on the left, NV12 on the right.
+struct ColourCamera : Camera {
+  static constexpr std::uint8_t kU = 118;
+  static constexpr std::uint8_t kV = 140;
+
+  ColourWanted wanted = std::make_shared<std::atomic<bool>>(false);
+  ColourKeeper left{wanted};
+  ColourKeeper right{wanted};
+
+  /// Levels at which these colour differences leave no value out of range.
+  static SideImage luma(int width, int height, int seed) {
+    SideImage side = test_side(width, height, seed);
+    auto data = std::make_shared<std::vector<std::uint8_t>>(*side.data);
+    for (std::uint8_t& level : *data) level = static_cast<std::uint8_t>(40 + level * 2 / 3);
+    side.data = data;
+    return side;
+  }
+
+  void publish_colour() {
+    *wanted = publisher.wants_colour();
+    StereoFrame frame = test_frame(++sequence);
+    frame.left = luma(752, 480, 1);
+    frame.right = luma(640, 400, 2);
+    std::vector<std::uint8_t> uyvy;
+    for (const std::uint8_t level : *frame.left.data) {
+      uyvy.push_back(uyvy.size() % 4 == 0 ? kU : kV);
+      uyvy.push_back(level);
+    }
+    std::vector<std::uint8_t> nv12 = *frame.right.data;
+    for (int i = 0; i < 640 * 200; ++i) nv12.push_back(i % 2 == 0 ? kU : kV);
+    const StereoColour colour = {left.keep({CameraFormat::kUyvy, 752, 480, 1504, uyvy}),
+                                 right.keep({CameraFormat::kNv12, 640, 400, 640, nv12})};
+    const auto done = publisher.publish(frame, colour);
+    EXPECT_TRUE(done.ok()) << done.error();
+  }
+
+  /// Publishes until the reader has got `count` messages, which `look` sees.
+  template <class T, class F>
+  bool publish_until(Reader<T>& reader, int count, F&& look) {
+    return eventually([&] {
+      publish_colour();
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+      const auto taken = reader.take_each([&](const T& m, const dds_sample_info_t&) {
+        look(m);
+        --count;
+      });
+      return taken.ok() && count <= 0;
+    });
+  }
+};
+
+/// That an image shows the colours of ColourCamera over the luma of a side.
+void expect_colour(const msg::Image& m, const SideImage& luma) {
+  EXPECT_STREQ(m.encoding, "rgb8");
+  ASSERT_EQ(m.width, static_cast<std::uint32_t>(luma.width));
+  ASSERT_EQ(m.height, static_cast<std::uint32_t>(luma.height));
+  EXPECT_EQ(m.step, 3 * m.width);
+  ASSERT_EQ(m.data._length, 3 * luma.data->size());
+  double worst_luma = 0.0;
+  double worst_red = 0.0;
+  double worst_blue = 0.0;
+  for (std::size_t i = 0; i < luma.data->size(); ++i) {
+    const std::uint8_t* c = m.data._buffer + 3 * i;
+    const double level = (*luma.data)[i];
+    const double seen = 0.299 * c[0] + 0.587 * c[1] + 0.114 * c[2];
+    worst_luma = std::max(worst_luma, std::abs(seen - level));
+    worst_red = std::max(worst_red, std::abs(c[0] - level - 1.402 * (ColourCamera::kV - 128)));
+    worst_blue = std::max(worst_blue, std::abs(c[2] - level - 1.772 * (ColourCamera::kU - 128)));
+  }
+  EXPECT_LT(worst_luma, 1.0);
+  EXPECT_LT(worst_red, 1.0);
+  EXPECT_LT(worst_blue, 1.0);
+}
+
+TEST(CameraViews, ColourIsTheFramesOwnOnBothSides) {
+  ColourCamera camera;
+  const Participant other = open_participant();
+  auto left = require(Reader<msg::Image>::open(other, "left/image_color", topics::kImageQos));
+  EXPECT_TRUE(camera.publish_until(left, 1, [&](const msg::Image& m) {
+    EXPECT_STREQ(m.header.frame_id, "cam_left_camera_optical_frame");
+    EXPECT_TRUE(is_of_a_frame(m.header, camera.sequence));
+    expect_colour(m, ColourCamera::luma(752, 480, 1));
+  }));
+  auto right = require(Reader<msg::Image>::open(other, "right/image_color", topics::kImageQos));
+  EXPECT_TRUE(camera.publish_until(right, 1, [&](const msg::Image& m) {
+    EXPECT_STREQ(m.header.frame_id, "cam_right_camera_optical_frame");
+    EXPECT_TRUE(is_of_a_frame(m.header, camera.sequence));
+    expect_colour(m, ColourCamera::luma(640, 400, 2));
+  }));
+  EXPECT_EQ(camera.publisher.view_counters().failed, 0U);
+}
+
+TEST(CameraViews, ColourIsNeitherKeptNorMadeWithoutItsReader) {
+  ColourCamera camera;
+  const Participant other = open_participant();
+  // Reading this keeps the thread of the views at work; it is not counted as made.
+  auto info = require(Reader<msg::CameraInfo>::open(other, "left/camera_info", topics::kImageQos));
+  const auto pass = [](const msg::CameraInfo&) {};
+  EXPECT_TRUE(camera.publish_until(info, 4, pass));
+  EXPECT_EQ(camera.left.kept() + camera.right.kept(), 0U);
+  EXPECT_EQ(camera.publisher.view_counters().made, 0U);
+  {
+    auto color = require(Reader<msg::Image>::open(other, "left/image_color", topics::kImageQos));
+    EXPECT_TRUE(camera.publish_until(color, 2, [](const msg::Image&) {}));
+    EXPECT_GE(camera.left.kept(), 2U);
+    EXPECT_GE(camera.publisher.view_counters().made, 2U);
+  }
+  EXPECT_TRUE(eventually([&] { return !camera.publisher.wants_colour(); }));
+  const std::uint64_t kept = camera.left.kept();
+  const std::uint64_t made = camera.publisher.view_counters().made;
+  EXPECT_TRUE(camera.publish_until(info, 4, pass));
+  EXPECT_EQ(camera.left.kept(), kept);
+  EXPECT_EQ(camera.publisher.view_counters().made, made);
+}
+
+TEST(CameraViews, DamagedColourIsCountedAndCostsNothingElse) {
+  Camera camera;
+  const Participant other = open_participant();
+  auto color = require(Reader<msg::Image>::open(other, "left/image_color", topics::kImageQos));
+  auto raw = require(Reader<msg::Image>::open(other, "left/image_raw", topics::kImageQos));
+  EXPECT_TRUE(eventually([&] { return camera.publisher.wants_colour(); }));
+  const auto bytes = std::make_shared<std::vector<std::uint8_t>>(100, 1);
+  const StereoColour damaged = {{CameraFormat::kMjpeg, 752, 480, 752, bytes, 0, 752}, {}};
+  EXPECT_TRUE(eventually([&] {
+    EXPECT_TRUE(camera.publisher.publish(test_frame(++camera.sequence), damaged).ok());
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    return camera.publisher.view_counters().failed > 1;
+  }));
+  camera.show(raw, [](const msg::Image& m) { EXPECT_STREQ(m.encoding, "mono8"); });
+  EXPECT_EQ(require(color.take_each([](const msg::Image&, const dds_sample_info_t&) {})), 0U);
+}
+
 TEST(ImageConversion, ReducingGivesTheMeansOfBlocks) {
   const std::vector<std::uint8_t> pixels = {10, 20, 100, 100, 9, 30, 40, 100, 100, 9};
   std::vector<std::uint8_t> storage;

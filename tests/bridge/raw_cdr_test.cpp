@@ -170,6 +170,7 @@ TEST(TopicCatalog, KnowsTypeAndQosOfEveryTopic) {
   EXPECT_EQ(find_topic(topics::kStereo)->schema->ros_name, "sovo_msgs/msg/StereoFrame");
   EXPECT_TRUE(find_topic(topics::kKeyframe)->qos.latched);
   EXPECT_TRUE(find_topic("left/image_raw/compressed")->on_demand);
+  EXPECT_TRUE(find_topic("right/image_color")->on_demand);
   EXPECT_EQ(find_topic("nothing"), nullptr);
   EXPECT_EQ(find_schema("no_msgs/msg/Nothing"), nullptr);
 }

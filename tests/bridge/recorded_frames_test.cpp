@@ -139,6 +139,7 @@ TEST_F(RecordedFramesTest, RawImagesWithCalibrationComeBeforeAllOthers) {
   for (const std::string side : {"left", "right"}) {
     put_image("/sovo/" + side + "/image_raw", 0, 1);
     put_image("/sovo/" + side + "/image_rect", 0, 1);
+    put_image("/sovo/" + side + "/image_color", 0, 1);
     put_jpeg("/sovo/" + side + "/preview/compressed", 0);
     put_image("/other/" + side + "/image_raw", 0, 1);
   }

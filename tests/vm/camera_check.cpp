@@ -4,7 +4,8 @@
 //     camera_check CALIBRATION FRAMES SECONDS KEY=VALUE...
 //
 // KEY=VALUE are keys of V4l2Options and, with "live.", of LiveOptions; "pattern=false" looks at no
-// pixel, "reconnects=N" goes on until there were so many.
+// pixel, "colour=true" asks for colour and compares it, "reconnects=N" goes on until there were so
+// many.
 
 #include <algorithm>
 #include <chrono>
@@ -13,6 +14,7 @@
 #include <iostream>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "sovo/driver/v4l2/v4l2_source.h"
 #include "sovo/io/text.h"
@@ -26,6 +28,7 @@ struct CheckOptions {
   v4l2::V4l2Options v4l2;
   LiveOptions live;
   bool pattern = true;
+  bool colour = false;
   int reconnects = 0;
 
   template <class Visitor>
@@ -33,6 +36,7 @@ struct CheckOptions {
     v4l2.visit(v);
     v("live", live, "");
     v("pattern", pattern, "");
+    v("colour", colour, "");
     v("reconnects", reconnects, "");
   }
 };
@@ -40,12 +44,14 @@ struct CheckOptions {
 /// What is wrong with the frames.
 struct Verdict {
   std::uint64_t frames = 0;
-  std::uint64_t torn = 0;        ///< Not one frame's pixels, or not of this side.
-  std::uint64_t mixed = 0;       ///< Left and right of different frames.
-  std::uint64_t missing = 0;     ///< Numbers between two frames that never came.
-  std::uint64_t uncounted = 0;   ///< Steps of the number that `sequence` does not have.
-  std::uint64_t not_rising = 0;  ///< Stamps.
-  double downtime_s = 0.0;       ///< Longest.
+  std::uint64_t torn = 0;         ///< Not one frame's pixels, or not of this side.
+  std::uint64_t mixed = 0;        ///< Left and right of different frames.
+  std::uint64_t missing = 0;      ///< Numbers between two frames that never came.
+  std::uint64_t uncounted = 0;    ///< Steps of the number that `sequence` does not have.
+  std::uint64_t not_rising = 0;   ///< Stamps.
+  std::uint64_t coloured = 0;     ///< Frames with colour on both sides.
+  std::uint64_t miscoloured = 0;  ///< Colours of the pattern are grey: all else.
+  double downtime_s = 0.0;        ///< Longest.
 };
 
 class Checker {
@@ -73,6 +79,16 @@ class Checker {
     reconnects_ = reconnects;
   }
 
+  /// Colour where it came, which is compared now and then: that takes an emulated machine long. The
+  /// pattern is grey: each value is the luma.
+  void look(const StereoFrame& frame, const StereoColour& colour) {
+    if (!colour.left.bytes || !colour.right.bytes) return;
+    if (verdict_.coloured++ % 8 != 0) return;
+    if (!is_grey(frame.left, colour.left) || !is_grey(frame.right, colour.right)) {
+      ++verdict_.miscoloured;
+    }
+  }
+
   const Verdict& verdict() const { return verdict_; }
 
  private:
@@ -81,6 +97,16 @@ class Checker {
     return read_pattern(side.data->data(), side.width, side.height, right);
   }
 
+  bool is_grey(const SideImage& side, const ColourImage& colour) {
+    if (!reader_.read(colour, &rgb_) || rgb_.size() != 3 * side.data->size()) return false;
+    for (std::size_t i = 0; i < rgb_.size(); ++i) {
+      if (rgb_[i] != (*side.data)[i / 3]) return false;
+    }
+    return true;
+  }
+
+  ColourReader reader_;
+  std::vector<std::uint8_t> rgb_;
   Verdict verdict_;
   std::int64_t last_stamp_ = 0;
   std::optional<std::uint32_t> last_number_;
@@ -93,6 +119,7 @@ void print(const Verdict& v, const LiveReport& report) {
   const CameraCounts& c = camera.counts;
   std::cout << "RESULT {\"frames\":" << v.frames << ",\"torn\":" << v.torn
             << ",\"mixed\":" << v.mixed << ",\"missing\":" << v.missing
+            << ",\"coloured\":" << v.coloured << ",\"miscoloured\":" << v.miscoloured
             << ",\"uncounted\":" << v.uncounted << ",\"not_rising\":" << v.not_rising
             << ",\"images\":" << c.images << ",\"skipped\":" << c.skipped
             << ",\"damaged\":" << c.damaged << ",\"short\":" << c.short_images
@@ -116,6 +143,7 @@ int run(const CheckOptions& options, const std::string& calibration, std::uint64
     std::cerr << "camera_check: " << opened.error() << std::endl;
     return 1;
   }
+  opened->source->want_colour(options.colour);
   Checker checker;
   Verdict worst;
   std::uint64_t reconnects = 0;
@@ -134,6 +162,7 @@ int run(const CheckOptions& options, const std::string& calibration, std::uint64
       std::cout << "BACK " << reconnects << " " << uptime_s() << std::endl;
     }
     checker.look(next.frame, camera.counts.reconnects, options.pattern);
+    checker.look(next.frame, opened->source->colour());
     if (checker.verdict().frames == 1) std::cout << "FIRST FRAME " << camera.device << std::endl;
     if (enough(camera.counts)) break;
   }

@@ -70,7 +70,7 @@ modprobe v4l2loopback devices=1 video_nr=20 card_label=Loop exclusive_caps=0 max
 WRITER=$!
 sleep 0.5
 "$BIN/camera_check" /tmp/hd.yaml $((8 * SECONDS_EACH)) $((60 * SECONDS_EACH)) device=/dev/video20 \
-  width=2560 height=720
+  width=2560 height=720 colour=true
 kill "$WRITER" 2>/dev/null
 wait "$WRITER" 2>/dev/null
 

@@ -61,6 +61,7 @@ class Cameras(unittest.TestCase):
         result = self.result("zed_stream")
         self.expect_whole(result)
         self.assertEqual(result["uncounted"], 0, result)
+        self.assertEqual(result["coloured"], 0, result)  # nobody asked
         self.assertGreaterEqual(result["frames"], 100)
         self.assertAlmostEqual(result["exposure_ms"], 4.2, 4)  # as the control was set
 
@@ -102,6 +103,8 @@ class Cameras(unittest.TestCase):
         # that the first step may have another length than the images'.
         self.assertLessEqual(result["uncounted"], 1, result)
         self.assertGreater(result["frames"], 20)
+        self.assertGreater(result["coloured"], 0, result)
+        self.assertEqual(result["miscoloured"], 0, result)
 
     def test_vivid_faults_are_survived_and_counted(self):
         result = self.result("vivid_errors")

@@ -185,6 +185,7 @@ void CameraWorker::handle_image(Capture* capture) {
   image.sequence = next_sequence_++;
   image.clock = ptp_ ? kPtpClock : config_.clock_kind;
   image.image = std::move(capture->image);
+  image.colour = std::move(capture->colour);
   {
     const std::scoped_lock lock(mutex_);
     CameraCounts& counts = report_.counts;
@@ -197,9 +198,7 @@ void CameraWorker::handle_image(Capture* capture) {
     capture->right.dropped = counts.dropped();
     measure_rate(now);
   }
-  std::optional<SideImage> right;
-  if (capture->right.valid) right = std::move(capture->right);
-  deliver_(std::move(image), std::move(right));
+  deliver_(std::move(image), {std::move(capture->right), std::move(capture->right_colour)});
 }
 
 /// Called with the mutex held.

@@ -27,13 +27,19 @@ struct CameraWorkerConfig {
   DeviceClockConfig clock;
 };
 
+/// The right image of a device that gives both sides at once.
+struct RightImage {
+  SideImage image;  ///< Not valid when there is none.
+  ColourImage colour;
+};
+
 /// Keeps one camera going on a thread of its own: opens it, hands over its images with UTC stamps,
 /// opens it anew when it is lost or silent, and counts.
 class CameraWorker {
  public:
   using Open = std::function<Result<std::unique_ptr<CaptureDevice>>()>;
-  /// Called on the worker's thread; must not block. `right` is set for a device of both sides.
-  using Deliver = std::function<void(TimedImage image, std::optional<SideImage> right)>;
+  /// Called on the worker's thread; must not block. `right` is valid for a device of both sides.
+  using Deliver = std::function<void(TimedImage image, RightImage right)>;
   /// Called on the worker's thread: stamps of this camera no longer compare with earlier ones.
   using ClockSet = std::function<void()>;
 

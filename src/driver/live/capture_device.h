@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "sovo/driver/live/colour.h"
 #include "sovo/image/stereo_frame.h"
 #include "sovo/io/result.h"
 
@@ -30,8 +31,10 @@ struct Capture {
   bool shared_clock = false;         ///< The device's clock is one with the other's, by PTP.
   std::uint64_t skipped = 0;         ///< Images that the device made and lost since the last one.
   SideImage image;
-  SideImage right;      ///< Of a device that gives both sides at once; else not valid.
-  std::string problem;  ///< For people, with a state other than kImage and kNone.
+  SideImage right;           ///< Of a device that gives both sides at once; else not valid.
+  ColourImage colour;        ///< Of `image`, while somebody wants it and the device has it.
+  ColourImage right_colour;  ///< Of `right`.
+  std::string problem;       ///< For people, with a state other than kImage and kNone.
 };
 
 /// How much light a camera takes.

@@ -4,35 +4,17 @@
 #include <utility>
 
 namespace sovo {
-namespace {
-
-StereoFrame to_frame(StereoPair pair) {
-  StereoFrame frame;
-  frame.stamp_ns = pair.left.stamp_ns;
-  frame.sequence = pair.left.sequence;
-  frame.clock = pair.left.clock;
-  frame.stamp_sigma_s = pair.left.stamp_sigma_s;
-  frame.left = std::move(pair.left.image);
-  if (pair.right) {
-    const std::int64_t offset = pair.right->time_ns - pair.left.time_ns;
-    frame.pair_error_s = 1e-9 * static_cast<double>(std::abs(offset));
-    frame.right = std::move(pair.right->image);
-    frame.right.stamp_offset_ns = offset;
-  }
-  return frame;
-}
-
-}  // namespace
-
 LiveSource::LiveSource(StereoRig rig, const LiveSourceConfig& config,
                        std::vector<LiveCamera> cameras)
-    : rig_(std::move(rig)), pairer_(config.pair_tolerance_ns, config.max_waiting) {
+    : rig_(std::move(rig)),
+      colour_wanted_(config.colour_wanted),
+      pairer_(config.pair_tolerance_ns, config.max_waiting) {
   if (config.auto_exposure) auto_exposure_.emplace(*config.auto_exposure);
   const bool both = cameras.size() == 1;
   workers_.reserve(cameras.size());
   for (LiveCamera& camera : cameras) {
     const auto side = workers_.empty() ? CameraSide::kLeft : CameraSide::kRight;
-    const auto deliver = [this, both, side](TimedImage image, std::optional<SideImage> right) {
+    const auto deliver = [this, both, side](TimedImage image, RightImage right) {
       if (both) {
         take_both(std::move(image), std::move(right));
       } else {
@@ -50,11 +32,31 @@ LiveSource::LiveSource(StereoRig rig, const LiveSourceConfig& config,
 
 LiveSource::~LiveSource() { workers_.clear(); }
 
-void LiveSource::take_both(TimedImage image, std::optional<SideImage> right) {
+LiveSource::Queued LiveSource::to_queued(StereoPair pair) {
+  Queued queued;
+  StereoFrame& frame = queued.frame;
+  frame.stamp_ns = pair.left.stamp_ns;
+  frame.sequence = pair.left.sequence;
+  frame.clock = pair.left.clock;
+  frame.stamp_sigma_s = pair.left.stamp_sigma_s;
+  frame.left = std::move(pair.left.image);
+  queued.colour.left = std::move(pair.left.colour);
+  if (pair.right) {
+    const std::int64_t offset = pair.right->time_ns - pair.left.time_ns;
+    frame.pair_error_s = 1e-9 * static_cast<double>(std::abs(offset));
+    frame.right = std::move(pair.right->image);
+    frame.right.stamp_offset_ns = offset;
+    queued.colour.right = std::move(pair.right->colour);
+  }
+  return queued;
+}
+
+void LiveSource::take_both(TimedImage image, RightImage right) {
   StereoPair pair{std::move(image), std::nullopt};
-  if (right) {
-    pair.right = TimedImage{pair.left.time_ns,  pair.left.stamp_ns, pair.left.stamp_sigma_s,
-                            pair.left.sequence, pair.left.clock,    std::move(*right)};
+  if (right.image.valid) {
+    pair.right = pair.left;
+    pair.right->image = std::move(right.image);
+    pair.right->colour = std::move(right.colour);
   }
   const std::scoped_lock lock(mutex_);
   push(std::move(pair));
@@ -73,17 +75,23 @@ void LiveSource::push(StereoPair pair) {
     head_ = (head_ + 1) % kQueue;
     --count_;
   }
-  queue_[(head_ + count_) % kQueue] = to_frame(std::move(pair));
+  queue_[(head_ + count_) % kQueue] = to_queued(std::move(pair));
   ++count_;
   arrived_.notify_one();
 }
 
+void LiveSource::want_colour(bool wanted) {
+  if (colour_wanted_) *colour_wanted_ = wanted;
+}
+
 SourceResult LiveSource::next(std::chrono::milliseconds timeout) {
   SourceResult result;
+  colour_ = {};
   {
     std::unique_lock lock(mutex_);
     if (!arrived_.wait_for(lock, timeout, [this] { return count_ > 0; })) return result;
-    result.frame = std::move(queue_[head_]);
+    result.frame = std::move(queue_[head_].frame);
+    colour_ = std::move(queue_[head_].colour);
     queue_[head_] = {};
     head_ = (head_ + 1) % kQueue;
     --count_;

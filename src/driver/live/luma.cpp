@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 namespace sovo {
 namespace {
@@ -56,7 +57,21 @@ std::size_t expected_bytes(const RawImage& image) {
   return static_cast<std::size_t>(image.stride) * (image.height + image.height / 2 - 1) + row;
 }
 
-struct LumaReader::Decoder {
+std::string find_problem(const RawImage& image) {
+  if (image.width < 2 || image.height < 1) return "the image has no size";
+  if (image.format == CameraFormat::kMjpeg) return "";
+  if (image.stride < image.width * bytes_per_pixel(image.format)) {
+    return "rows of " + std::to_string(image.stride) + " bytes are too short for " +
+           std::to_string(image.width) + " pixels " + to_string(image.format);
+  }
+  if (image.bytes.size() < expected_bytes(image)) {
+    return std::to_string(image.bytes.size()) + " bytes came, " +
+           std::to_string(expected_bytes(image)) + " make an image";
+  }
+  return "";
+}
+
+struct CameraJpegDecoder::Decoder {
   Decoder() : handle(tjInitDecompress()) {}
   ~Decoder() {
     if (handle != nullptr) tjDestroy(handle);
@@ -67,36 +82,19 @@ struct LumaReader::Decoder {
   tjhandle handle;
 };
 
-LumaReader::LumaReader() = default;
-LumaReader::~LumaReader() = default;
-LumaReader::LumaReader(LumaReader&&) noexcept = default;
-LumaReader& LumaReader::operator=(LumaReader&&) noexcept = default;
+CameraJpegDecoder::CameraJpegDecoder() = default;
+CameraJpegDecoder::~CameraJpegDecoder() = default;
+CameraJpegDecoder::CameraJpegDecoder(CameraJpegDecoder&&) noexcept = default;
+CameraJpegDecoder& CameraJpegDecoder::operator=(CameraJpegDecoder&&) noexcept = default;
 
-bool LumaReader::check(const RawImage& image) {
-  if (image.width < 2 || image.height < 1) {
-    problem_ = "the image has no size";
-  } else if (image.format == CameraFormat::kMjpeg) {
-    return true;
-  } else if (image.stride < image.width * bytes_per_pixel(image.format)) {
-    problem_ = "rows of " + std::to_string(image.stride) + " bytes are too short for " +
-               std::to_string(image.width) + " pixels " + to_string(image.format);
-  } else if (image.bytes.size() < expected_bytes(image)) {
-    problem_ = std::to_string(image.bytes.size()) + " bytes came, " +
-               std::to_string(expected_bytes(image)) + " make an image";
-  } else {
-    return true;
-  }
-  return false;
-}
-
-bool LumaReader::decode_jpeg(const RawImage& image, std::uint8_t* luma) {
-  if (try_jpeg(image, luma)) return true;
+bool CameraJpegDecoder::decode(const RawImage& image, Output output, std::uint8_t* pixels) {
+  if (try_decode(image, output, pixels)) return true;
   // A decoder that met damaged data goes on to refuse good data.
   decoder_.reset();
   return false;
 }
 
-bool LumaReader::try_jpeg(const RawImage& image, std::uint8_t* luma) {
+bool CameraJpegDecoder::try_decode(const RawImage& image, Output output, std::uint8_t* pixels) {
   if (!decoder_) decoder_ = std::make_unique<Decoder>();
   const auto size = static_cast<unsigned long>(image.bytes.size());
   int width = 0;
@@ -114,12 +112,25 @@ bool LumaReader::try_jpeg(const RawImage& image, std::uint8_t* luma) {
     return false;
   }
   // Warnings are data that ended early or made no sense: the lower part of the image is grey.
-  if (tjDecompress2(decoder_->handle, image.bytes.data(), size, luma, width, 0, height, TJPF_GRAY,
-                    TJFLAG_STOPONWARNING) != 0) {
+  if (tjDecompress2(decoder_->handle, image.bytes.data(), size, pixels, width, 0, height,
+                    output == Output::kRgb ? TJPF_RGB : TJPF_GRAY, TJFLAG_STOPONWARNING) != 0) {
     problem_ = std::string("damaged JPEG: ") + tjGetErrorStr2(decoder_->handle);
     return false;
   }
   return true;
+}
+
+bool LumaReader::check(const RawImage& image) {
+  std::string problem = find_problem(image);
+  if (problem.empty()) return true;
+  problem_ = std::move(problem);
+  return false;
+}
+
+bool LumaReader::decode_jpeg(const RawImage& image, std::uint8_t* luma) {
+  if (decoder_.decode(image, CameraJpegDecoder::Output::kGrey, luma)) return true;
+  problem_ = decoder_.problem();
+  return false;
 }
 
 bool LumaReader::read(const RawImage& image, std::uint8_t* luma) {

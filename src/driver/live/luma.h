@@ -32,15 +32,38 @@ struct RawImage {
 /// Bytes that a whole image of this shape has at least; 0 where that varies (JPEG).
 std::size_t expected_bytes(const RawImage& image);
 
+/// Why an image cannot be read: no size, rows or bytes too few. Empty when it can; a JPEG is not
+/// looked into.
+std::string find_problem(const RawImage& image);
+
+/// Decodes a camera's JPEGs. Keeps a decoder and its memory.
+class CameraJpegDecoder {
+ public:
+  enum class Output { kGrey, kRgb };  ///< One byte or three a pixel.
+
+  CameraJpegDecoder();
+  ~CameraJpegDecoder();
+  CameraJpegDecoder(CameraJpegDecoder&&) noexcept;
+  CameraJpegDecoder& operator=(CameraJpegDecoder&&) noexcept;
+
+  /// The whole image, rows tightly packed. False when it is damaged or of another size than it
+  /// says; `problem()` tells.
+  bool decode(const RawImage& image, Output output, std::uint8_t* pixels);
+
+  const std::string& problem() const { return problem_; }
+
+ private:
+  struct Decoder;
+  bool try_decode(const RawImage& image, Output output, std::uint8_t* pixels);
+
+  std::unique_ptr<Decoder> decoder_;
+  std::string problem_;
+};
+
 /// Takes the luma out of camera images, which is all that the odometry looks at: colour is not
 /// converted. Keeps a JPEG decoder and its memory.
 class LumaReader {
  public:
-  LumaReader();
-  ~LumaReader();
-  LumaReader(LumaReader&&) noexcept;
-  LumaReader& operator=(LumaReader&&) noexcept;
-
   /// Luma of the whole image into `luma`, width * height bytes. False when the image is short,
   /// damaged, or of another size than it says; `problem()` tells.
   bool read(const RawImage& image, std::uint8_t* luma);
@@ -51,12 +74,10 @@ class LumaReader {
   const std::string& problem() const { return problem_; }
 
  private:
-  struct Decoder;
   bool check(const RawImage& image);
-  bool try_jpeg(const RawImage& image, std::uint8_t* luma);
   bool decode_jpeg(const RawImage& image, std::uint8_t* luma);
 
-  std::unique_ptr<Decoder> decoder_;
+  CameraJpegDecoder decoder_;
   std::vector<std::uint8_t> scratch_;  ///< A whole JPEG's luma, to be halved.
   std::string problem_;
 };

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "sovo/driver/live/colour.h"
 #include "sovo/image/stereo_frame.h"
 
 namespace sovo {
@@ -19,6 +20,7 @@ struct TimedImage {
   std::uint64_t sequence = 0;  ///< Counts every image that the camera made.
   std::uint8_t clock = 0;      ///< As `StereoFrame::clock`.
   SideImage image;
+  ColourImage colour;  ///< Of `image`, where it was kept.
 };
 
 /// A left image and, when it has one, the right image of the same instant.

@@ -91,7 +91,8 @@ V4l2Capture::V4l2Capture(std::string path, DeviceFile file, MappedBuffers buffer
       file_(std::move(file)),
       buffers_(std::move(buffers)),
       mode_(mode),
-      options_(std::move(options)) {}
+      options_(std::move(options)),
+      colour_(options_.colour_wanted) {}
 
 V4l2Capture::~V4l2Capture() {
   int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
@@ -186,8 +187,21 @@ CaptureState V4l2Capture::read(const v4l2_buffer& taken, Capture* capture) {
     image.data = right;
     capture->right = image;
   }
+  keep_colour(raw, capture);
   fill_times(taken, capture);
   return CaptureState::kImage;
+}
+
+void V4l2Capture::keep_colour(const RawImage& raw, Capture* capture) {
+  capture->colour = colour_.keep(raw);
+  if (!options_.side_by_side || !capture->colour.bytes) return;
+  capture->right_colour = capture->colour.half(true);
+  capture->colour = capture->colour.half(false);
+}
+
+std::vector<std::pair<std::string, std::string>> V4l2Capture::counters() {
+  return {{"colour_kept", std::to_string(colour_.kept())},
+          {"colour_skipped", std::to_string(colour_.skipped())}};
 }
 
 void V4l2Capture::fill_times(const v4l2_buffer& taken, Capture* capture) {

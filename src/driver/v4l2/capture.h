@@ -5,9 +5,11 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "sovo/driver/live/capture_device.h"
+#include "sovo/driver/live/colour.h"
 #include "sovo/driver/live/image_pool.h"
 #include "sovo/driver/live/luma.h"
 #include "sovo/driver/v4l2/controls.h"
@@ -43,6 +45,7 @@ struct CaptureOptions {
   V4l2Options v4l2;
   bool side_by_side = true;
   std::shared_ptr<CapturePools> pools;
+  ColourWanted colour_wanted;
   int width = 0;  ///< Of the calibrated image, a side of it [px]; another one is refused.
   int height = 0;
 };
@@ -79,6 +82,7 @@ class V4l2Capture : public CaptureDevice {
 
   CaptureState next(std::chrono::milliseconds timeout, Capture* capture) override;
   Result<void> set_exposure(const Exposure& exposure) override;
+  std::vector<std::pair<std::string, std::string>> counters() override;
   std::string description() const override;
 
  private:
@@ -88,6 +92,7 @@ class V4l2Capture : public CaptureDevice {
   Result<void> start();
   CaptureState wait(std::chrono::milliseconds timeout, Capture* capture);
   CaptureState read(const v4l2_buffer& taken, Capture* capture);
+  void keep_colour(const RawImage& raw, Capture* capture);
   void fill_times(const v4l2_buffer& taken, Capture* capture);
   void update_exposure();
   CaptureState gone(Capture* capture) const;
@@ -98,6 +103,7 @@ class V4l2Capture : public CaptureDevice {
   StreamMode mode_;
   CaptureOptions options_;
   LumaReader luma_;
+  ColourKeeper colour_;
   std::vector<ControlInfo> controls_;
   bool streaming_ = false;
   std::optional<std::uint32_t> last_sequence_;

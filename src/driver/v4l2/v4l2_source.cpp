@@ -1,5 +1,6 @@
 #include "sovo/driver/v4l2/v4l2_source.h"
 
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <optional>
@@ -90,8 +91,10 @@ Result<Calibration> load(const std::string& path, const V4l2Options& options, co
       "https://calib.stereolabs.com/?SN=SERIAL (see docs/cameras.md)"};
 }
 
-CaptureOptions capture_options(const V4l2Options& options, const CameraModel& camera) {
+CaptureOptions capture_options(const V4l2Options& options, const CameraModel& camera,
+                               const ColourWanted& colour_wanted) {
   CaptureOptions capture;
+  capture.colour_wanted = colour_wanted;
   capture.v4l2 = options;
   capture.side_by_side = !options.two_devices();
   const auto bytes = static_cast<std::size_t>(camera.width) * camera.height;
@@ -177,19 +180,22 @@ Result<OpenedSource> open_v4l2(const V4l2Options& options, const LiveOptions& li
   double rate = options.frame_rate;
   if (rate <= 0.0 && left->mode) rate = left->mode->frame_rate;
   if (rate <= 0.0) rate = kUsualRate;
+  LiveSourceConfig config;
+  config.pair_tolerance_ns = live.tolerance_ns(rate);
+  config.colour_wanted = std::make_shared<std::atomic<bool>>(false);
+  if (live.auto_exposure.enabled) config.auto_exposure = live.auto_exposure.config();
+  const auto make = [&](const char* name, const Probe& found, const CameraModel& model) {
+    return make_camera(name, found, capture_options(options, model, config.colour_wanted), live,
+                       rate);
+  };
   std::vector<LiveCamera> cameras;
-  cameras.push_back(
-      make_camera(two ? "left" : "camera", *left, capture_options(options, rig.left), live, rate));
+  cameras.push_back(make(two ? "left" : "camera", *left, rig.left));
   if (two) {
     const auto right = probe(options.right, options, &opened);
     if (!right) return right.failure();
     if (auto fits = check_fit(*right, rig.right, false); !fits) return fits.failure();
-    cameras.push_back(
-        make_camera("right", *right, capture_options(options, rig.right), live, rate));
+    cameras.push_back(make("right", *right, rig.right));
   }
-  LiveSourceConfig config;
-  config.pair_tolerance_ns = live.tolerance_ns(rate);
-  if (live.auto_exposure.enabled) config.auto_exposure = live.auto_exposure.config();
   opened.source = std::make_unique<LiveSource>(rig, config, std::move(cameras));
   return opened;
 }

@@ -60,6 +60,71 @@ class ScriptedDevice : public CaptureDevice {
   int given_ = 0;
 };
 
+std::deque<Step> images(int first, int count) {
+  std::deque<Step> steps;
+  for (int n = first; n < first + count; ++n)
+    steps.push_back({CaptureState::kImage, n * kScriptPeriod});
+  return steps;
+}
+
+/// A scripted camera with an image whose bytes tell its time, of both sides or one.
+class ColourDevice : public ScriptedDevice {
+ public:
+  ColourDevice(std::deque<Step> steps, bool both, Taken taken, ColourWanted wanted)
+      : ScriptedDevice(std::move(steps), both, std::move(taken)), keeper_(std::move(wanted)) {}
+
+  CaptureState next(std::chrono::milliseconds timeout, Capture* capture) override {
+    const CaptureState state = ScriptedDevice::next(timeout, capture);
+    if (state != CaptureState::kImage) return state;
+    const std::vector<std::uint8_t> bytes(
+        16, static_cast<std::uint8_t>(capture->device_ns / kScriptPeriod));
+    const ColourImage colour = keeper_.keep({CameraFormat::kYuyv, 4, 2, 8, bytes});
+    capture->colour = capture->right.valid ? colour.half(false) : colour;
+    if (capture->right.valid) capture->right_colour = colour.half(true);
+    return state;
+  }
+
+ private:
+  ColourKeeper keeper_;
+};
+
+LiveCamera colour_camera(int count, bool both, const Taken& taken, const ColourWanted& wanted) {
+  LiveCamera result;
+  result.config.stall = std::chrono::minutes(10);
+  result.config.frame_rate = 100.0;
+  result.config.shared_clock = true;
+  result.open = [=]() -> Result<std::unique_ptr<CaptureDevice>> {
+    return std::unique_ptr<CaptureDevice>(
+        std::make_unique<ColourDevice>(images(0, count), both, taken, wanted));
+  };
+  return result;
+}
+
+/// Takes `count` frames; whether colour came with each, all of it of the frame's own instant.
+std::vector<bool> take_coloured(LiveSource* source, int count, const Taken& taken) {
+  std::vector<bool> coloured;
+  for (int tries = 0; static_cast<int>(coloured.size()) < count && tries < 2000; ++tries) {
+    const auto next = source->next(std::chrono::milliseconds(50));
+    if (next.state != SourceState::kFrame) {
+      EXPECT_FALSE(source->colour().left.bytes) << "of an older frame";
+      continue;
+    }
+    ++*taken;
+    const auto number = (next.frame.stamp_ns - 1'000'000'000'000) / kScriptPeriod;
+    const StereoColour& colour = source->colour();
+    for (const ColourImage* side : {&colour.left, &colour.right}) {
+      if (side->bytes) {
+        EXPECT_EQ(side->bytes->at(0), static_cast<std::uint8_t>(number));
+      }
+    }
+    coloured.push_back(colour.left.bytes && colour.right.bytes);
+    EXPECT_EQ(colour.left.bytes != nullptr,
+              colour.right.bytes != nullptr || !next.frame.right.valid)
+        << number;
+  }
+  return coloured;
+}
+
 /// Opens one scripted device after the other; an empty script is a failure to open.
 LiveCamera camera(std::vector<std::deque<Step>> scripts, bool both, const Taken& taken = nullptr) {
   LiveCamera result;
@@ -77,13 +142,6 @@ LiveCamera camera(std::vector<std::deque<Step>> scripts, bool both, const Taken&
     return std::unique_ptr<CaptureDevice>(std::make_unique<ScriptedDevice>(script, both, taken));
   };
   return result;
-}
-
-std::deque<Step> images(int first, int count) {
-  std::deque<Step> steps;
-  for (int n = first; n < first + count; ++n)
-    steps.push_back({CaptureState::kImage, n * kScriptPeriod});
-  return steps;
 }
 
 std::vector<StereoFrame> take(LiveSource* source, std::size_t count, const Taken& taken = nullptr) {
@@ -190,6 +248,36 @@ TEST(LiveSource, ASlowCallerLosesTheOldestFramesAndIsTold) {
   ASSERT_EQ(frames.size(), 4U);
   EXPECT_EQ(frames.back().sequence, 19U);
   EXPECT_EQ(source.report().queue_dropped, 16U);
+}
+
+TEST(LiveSource, ColourComesWithItsFrameWhileItIsWanted) {
+  const auto taken = std::make_shared<std::atomic<int>>(0);
+  LiveSourceConfig config;
+  config.colour_wanted = std::make_shared<std::atomic<bool>>(false);
+  std::vector<LiveCamera> cameras;
+  cameras.push_back(colour_camera(100, true, taken, config.colour_wanted));
+  LiveSource source({}, config, std::move(cameras));
+  const std::vector<bool> before = take_coloured(&source, 10, taken);
+  EXPECT_EQ(before, std::vector<bool>(10, false));
+  source.want_colour(true);
+  take_coloured(&source, 10, taken);  // some were captured before
+  EXPECT_EQ(take_coloured(&source, 10, taken), std::vector<bool>(10, true));
+  source.want_colour(false);
+  take_coloured(&source, 10, taken);
+  EXPECT_EQ(take_coloured(&source, 10, taken), std::vector<bool>(10, false));
+}
+
+TEST(LiveSource, ColoursOfTwoDevicesArePairedWithTheirImages) {
+  const auto taken = std::make_shared<std::atomic<int>>(0);
+  LiveSourceConfig config;
+  config.pair_tolerance_ns = kScriptPeriod / 4;
+  config.max_waiting = 12;  // the threads may run far apart
+  config.colour_wanted = std::make_shared<std::atomic<bool>>(true);
+  std::vector<LiveCamera> cameras;
+  cameras.push_back(colour_camera(30, false, taken, config.colour_wanted));
+  cameras.push_back(colour_camera(30, false, taken, config.colour_wanted));
+  LiveSource source({}, config, std::move(cameras));
+  EXPECT_EQ(take_coloured(&source, 30, taken), std::vector<bool>(30, true));
 }
 
 TEST(ImagePool, GivesABufferOnlyWhenNobodyHoldsIt) {

@@ -4,15 +4,6 @@
 
 namespace sovo {
 
-namespace {
-
-/// Position of a keyframe without the similarities that came later than its own.
-Vec3 without_later(const KeyframePose& k) {
-  return (k.T_world_camera.translation() - k.later_shift) / k.later_scale;
-}
-
-}  // namespace
-
 std::vector<SE3> refined_keyframe_poses(const std::vector<KeyframePose>& keyframes) {
   std::vector<SE3> poses;
   refine_keyframe_poses(keyframes, 0, &poses);
@@ -24,11 +15,7 @@ void refine_keyframe_poses(const std::vector<KeyframePose>& keyframes, std::size
   poses->resize(keyframes.size());
   for (std::size_t i = first; i < keyframes.size(); ++i) {
     const KeyframePose& k = keyframes[i];
-    Vec3 position = without_later(k);
-    if (i > 0) {
-      const Vec3 step = position - without_later(keyframes[i - 1]);
-      position = (*poses)[i - 1].translation() + std::exp(k.own_log_scale) * step;
-    }
+    const Vec3 position = i == 0 ? k.step : (*poses)[i - 1] * k.step;
     (*poses)[i] = SE3(k.T_world_camera.rotation(), position);
   }
 }

@@ -34,8 +34,9 @@ class TrajectoryRecorder {
   std::vector<FrameRecord> frames_;
 };
 
-/// Keyframe positions with later similarities undone, each keyframe's own applied to the step that
-/// led to it: position_n = position_(n-1) + s_n (y_n - y_(n-1)), y without later similarities.
+/// Keyframes step by step from the first one (`KeyframePose::step`). Positions of the window would
+/// not do: while it moves on, its scale drifts and is put right again, and what that moves far
+/// behind it differs by when a keyframe left.
 std::vector<SE3> refined_keyframe_poses(const std::vector<KeyframePose>& keyframes);
 
 /// The same when only keyframes from `first` on have changed: `poses` keeps those before.

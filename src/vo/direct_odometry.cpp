@@ -304,12 +304,21 @@ void DirectOdometry::add_immature_points(const DepthProposer& proposer, const Ma
 void DirectOdometry::record_poses() {
   for (int i = 0; i < window_.size(); ++i) {
     const Keyframe& k = window_[i];
-    if (keyframes_.size() <= k.id) keyframes_.resize(k.id + std::size_t{1});
+    const bool is_new = keyframes_.size() <= k.id;
+    if (is_new) keyframes_.resize(k.id + std::size_t{1});
     KeyframePose& record = keyframes_[k.id];
     record.id = k.id;
-    if (record.stamp_ns != k.stamp_ns) record.log_scale = log_scale_;
+    if (is_new) record.log_scale = log_scale_;
     record.stamp_ns = k.stamp_ns;
     record.T_world_camera = k.T_world_camera();
+    const bool beside_its_previous = i > 0 && window_[i - 1].id + 1 == k.id;
+    if (k.id == 0) {
+      if (is_new) record.step = record.T_world_camera.translation();
+    } else if (is_new || beside_its_previous) {
+      const SE3& T_world_previous = keyframes_[k.id - std::size_t{1}].T_world_camera;
+      record.step =
+          (T_world_previous.inverse() * record.T_world_camera).translation() / record.later_scale;
+    }
   }
 }
 
@@ -370,11 +379,8 @@ double DirectOdometry::apply(const ScaleCorrection& correction) {
     rescale_records(scale, centre);
   } else {
     for (int i = 0; i + 1 < window_.size(); ++i) {
-      KeyframePose& record = keyframes_[window_[i].id];
-      record.later_scale *= scale;
-      record.later_shift = scale * record.later_shift + (1.0 - scale) * centre;
+      keyframes_[window_[i].id].later_scale *= scale;
     }
-    keyframes_[window_.newest().id].own_log_scale += log_scale;
   }
   ++scale_epoch_;
   epoch_log_scale_.push_back(log_scale_);
@@ -390,6 +396,8 @@ void DirectOdometry::rescale_records(double scale, const Vec3& centre) {
   for (KeyframePose& record : keyframes_) {
     Vec3& position = record.T_world_camera.translation();
     position = centre + scale * (position - centre);
+    record.step =
+        record.id == 0 ? Vec3(centre + scale * (record.step - centre)) : scale * record.step;
     record.log_scale = log_scale_;
   }
 }

@@ -81,12 +81,12 @@ struct KeyframePose {
   std::uint32_t id = 0;
   std::int64_t stamp_ns = 0;
   SE3 T_world_camera;
-  /// Similarities that were applied after this keyframe was the newest one, composed:
-  /// position now = later_scale * (position without them) + later_shift.
-  double later_scale = 1.0;
-  Vec3 later_shift = Vec3::Zero();
-  double own_log_scale = 0.0;  ///< Similarity that was measured on this keyframe.
-  double log_scale = 0.0;      ///< Sum of all similarities applied up to its own.
+  /// From the keyframe before it, in that one's axes, as when the two were last in the window
+  /// together; similarities later than this keyframe's own are undone. Of the first one: where the
+  /// map began.
+  Vec3 step = Vec3::Zero();
+  double later_scale = 1.0;  ///< Product of the similarities since this keyframe was the newest.
+  double log_scale = 0.0;    ///< Sum of all similarities applied up to its own.
 };
 
 /// Direct sparse odometry of one camera: tracking of every frame, a sliding window of keyframes,

@@ -14,36 +14,57 @@ KeyframePose keyframe(std::uint32_t id, const SE3& pose) {
   k.id = id;
   k.stamp_ns = 100 * (id + 1);
   k.T_world_camera = pose;
+  k.step = pose.translation();
   return k;
 }
 
-/// A window that is corrected in scale at each keyframe, as DirectOdometry does and records it.
+/// A window without images, in which the records are kept as DirectOdometry keeps them.
 class CorrectedWindow {
  public:
   void add(const Vec3& position) {
     keyframes_.push_back(
         keyframe(static_cast<std::uint32_t>(keyframes_.size()), {SO3(), position}));
     keyframes_.back().log_scale = log_scale_;
+    record();
   }
+  /// A measured similarity.
   void correct(double log_scale) {
-    const double s = std::exp(log_scale);
-    const Vec3 centre = keyframes_.back().T_world_camera.translation();
-    for (KeyframePose& k : keyframes_) {
-      Vec3& p = k.T_world_camera.translation();
-      p = centre + s * (p - centre);
-      if (&k == &keyframes_.back()) continue;
-      k.later_scale *= s;
-      k.later_shift = s * k.later_shift + (1.0 - s) * centre;
+    drift(log_scale);
+    for (std::size_t i = oldest_; i + 1 < keyframes_.size(); ++i) {
+      keyframes_[i].later_scale *= std::exp(log_scale);
     }
     log_scale_ += log_scale;
-    keyframes_.back().own_log_scale += log_scale;
     keyframes_.back().log_scale = log_scale_;
+    record();
   }
+  /// Bundle adjustment changes the scale of the window.
+  void drift(double log_scale) {
+    const Vec3 centre = newest();
+    for (std::size_t i = oldest_; i < keyframes_.size(); ++i) {
+      Vec3& p = keyframes_[i].T_world_camera.translation();
+      p = centre + std::exp(log_scale) * (p - centre);
+    }
+    record();
+  }
+  void drop_oldest() { ++oldest_; }
   const std::vector<KeyframePose>& keyframes() const { return keyframes_; }
   Vec3 newest() const { return keyframes_.back().T_world_camera.translation(); }
 
  private:
+  void record() {
+    for (std::size_t i = oldest_; i < keyframes_.size(); ++i) {
+      KeyframePose& k = keyframes_[i];
+      if (i > oldest_) {
+        k.step = (keyframes_[i - 1].T_world_camera.inverse() * k.T_world_camera).translation() /
+                 k.later_scale;
+      } else if (i == 0 && keyframes_.size() == 1) {
+        k.step = k.T_world_camera.translation();
+      }
+    }
+  }
+
   std::vector<KeyframePose> keyframes_;
+  std::size_t oldest_ = 0;
   double log_scale_ = 0.0;
 };
 
@@ -73,6 +94,35 @@ TEST(RefinedKeyframePoses, LaterSimilaritiesAreUndone) {
   // The window itself has shrunk its past again and again.
   const double past = window.newest().x() - window.keyframes()[0].T_world_camera.translation().x();
   EXPECT_LT(past, 4.5);
+}
+
+TEST(RefinedKeyframePoses, StayInLineWhenSomeLeaveTheWindowBeforeOthers) {
+  // Scale drifts and is put right while the window moves on: that moves what is far behind it by a
+  // lot, and what has left by then not at all.
+  CorrectedWindow window;
+  for (int i = 0; i < 4; ++i) window.add(Vec3(i, 0, 0));
+  window.drop_oldest();
+  window.drop_oldest();
+  window.add(Vec3(10, 0, 0));
+  window.drift(0.02);
+  window.correct(-0.02);
+  window.drift(0.02);
+  const auto poses = refined_keyframe_poses(window.keyframes());
+  EXPECT_GT(std::abs(window.keyframes()[2].T_world_camera.translation().x() - 2.0), 0.1);
+  for (int i = 1; i < 4; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    EXPECT_NEAR((poses[k].translation() - poses[k - 1].translation()).x(), 1.0, 0.05) << i;
+  }
+}
+
+TEST(RefinedKeyframePoses, StepsTurnWithTheKeyframeBefore) {
+  std::vector<KeyframePose> keyframes = {keyframe(0, at(0)), keyframe(1, at(0))};
+  keyframes[0].T_world_camera = SE3(SO3::exp(Vec3(0, 0, 0.5 * M_PI)), Vec3::Zero());
+  keyframes[0].step = Vec3(1, 2, 3);
+  keyframes[1].step = Vec3(1, 0, 0);
+  const auto poses = refined_keyframe_poses(keyframes);
+  EXPECT_LT((poses[0].translation() - Vec3(1, 2, 3)).norm(), 1e-12);
+  EXPECT_LT((poses[1].translation() - Vec3(1, 3, 3)).norm(), 1e-12);
 }
 
 TEST(RefinedKeyframePoses, OfNoneAreNone) { EXPECT_TRUE(refined_keyframe_poses({}).empty()); }

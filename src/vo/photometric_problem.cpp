@@ -58,10 +58,7 @@ std::vector<Vec8> relative_displacements(const Window& window, const VecX& x) {
 
 PhotometricProblem::PhotometricProblem(const WindowConfig& config, std::vector<PointRef> points,
                                        Window* window, WorkerPool* pool)
-    : config_(config),
-      points_(std::move(points)),
-      window_(window),
-      pool_(pool) {
+    : config_(config), points_(std::move(points)), window_(window), pool_(pool) {
   first_.reserve(points_.size() + 1);
   first_.push_back(0);
   damping_.reserve(points_.size());
@@ -83,8 +80,8 @@ PhotometricProblem::PhotometricProblem(const WindowConfig& config, std::vector<P
   sums_.resize(blocks_.size());
 }
 
-/// A pixel of parallax or less is lost in blur, and in what else moves all points of an image alike:
-/// there the depth that stereo gave is the better one, and keeps its weight.
+/// A pixel of parallax or less is lost in blur, and in what else moves all points of an image
+/// alike: there the depth that stereo gave is the better one, and keeps its weight.
 void PhotometricProblem::add_damping(const PointRef& ref, double depth_damping) {
   double baseline = 0.0;
   for (int t = 0; t < window_->size(); ++t) {

@@ -6,10 +6,9 @@ target_compile_options(sovo_warnings INTERFACE
 
 # GCC 12 sees overlapping copies in std::string's own concatenation (GCC bug 105329).
 target_compile_options(sovo_warnings INTERFACE $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-restrict>)
-if(CMAKE_SYSTEM_PROCESSOR STREQUAL aarch64)
-  # It tells of every std::pair that it is passed as compilers before GCC 10 did not.
-  target_compile_options(sovo_warnings INTERFACE $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-psabi>)
-endif()
+# It tells that wide registers are passed in another way where the processor has them (all functions
+# that take them are inlined, image/lanes.h), and on ARM of every std::pair.
+target_compile_options(sovo_warnings INTERFACE $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-psabi>)
 
 # For code that no frame passes through: a third of the compiler's time.
 add_library(sovo_lightly_optimized INTERFACE)

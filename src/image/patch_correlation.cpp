@@ -40,8 +40,8 @@ template <int kHalfS, int kHalfT>
 struct Grid {
   static constexpr std::size_t kSize =
       static_cast<std::size_t>((2 * kHalfS + 1) * (2 * kHalfT + 1));
-  static constexpr std::size_t kPadded = (kSize + kLanes - 1) / kLanes * kLanes;
-  alignas(16) std::array<float, kPadded> s{}, t{};
+  static constexpr std::size_t kPadded = (kSize + kWideLanes - 1) / kWideLanes * kWideLanes;
+  alignas(32) std::array<float, kPadded> s{}, t{};
   constexpr Grid() {
     std::size_t k = 0;
     for (int i = -kHalfS; i <= kHalfS; ++i) {
@@ -53,50 +53,63 @@ struct Grid {
   }
 };
 
-/// Samples a grid around `center`, `axes` = (along, across) steps. False when it leaves the image.
+/// Samples of a grid: center + i s + j t.
 template <int kHalfS, int kHalfT>
-bool sample_grid(const ImageF& image, const Vec2f& center, const Mat2f& axes, float* out) {
-  constexpr Grid<kHalfS, kHalfT> kGrid;
+struct SampleGrid {
+  template <class F>
+  SOVO_LANE_FUNCTION static void run(const ImageF& image, const Vec2f& center, const Vec2f& s,
+                                     const Vec2f& t, float* values) {
+    constexpr Grid<kHalfS, kHalfT> kGrid;
+    // Those that fill up the last lanes are not needed.
+    for (std::size_t k = 0; k < kGrid.kSize; k += lanes_of<F>) {
+      const F i = load_lane<F>(&kGrid.s[k]);
+      const F j = load_lane<F>(&kGrid.t[k]);
+      store_lane(sample_lanes(image, F(center.x() + i * s.x() + j * t.x()),
+                              F(center.y() + i * s.y() + j * t.y())),
+                 values + k);
+    }
+  }
+};
+
+/// Samples a grid around `center`, `axes` = (along, across) steps, and up to whole lanes more.
+/// False when it leaves the image.
+template <int kHalfS, int kHalfT>
+bool sample_grid(const ImageF& image, const Vec2f& center, const Mat2f& axes,
+                 std::array<float, Grid<kHalfS, kHalfT>::kPadded>* out) {
   const Vec2f s = axes.col(0);
   const Vec2f t = axes.col(1);
   if (!readable(image, center, kHalfS * s, kHalfT * t)) return false;
-  alignas(16) std::array<float, kGrid.kPadded> values;
-  for (std::size_t k = 0; k < kGrid.kPadded; k += kLanes) {
-    const Lane i = load_lane(&kGrid.s[k]);
-    const Lane j = load_lane(&kGrid.t[k]);
-    store_lane(
-        sample_lanes(image, center.x() + i * s.x() + j * t.x(), center.y() + i * s.y() + j * t.y()),
-        &values[k]);
-  }
-  std::copy_n(values.begin(), kGrid.kSize, out);
+  run_kernel<SampleGrid<kHalfS, kHalfT>>(image, center, s, t, out->data());
   return true;
 }
 
-float sum_of(const float* v) {
-  float sum = 0.0F;
-  for (int i = 0; i < kPatchSize; ++i) sum += v[i];
-  return sum;
+/// The pixels of a patch, along is the slow index, and zeros behind them up to whole lanes.
+using Patch = std::array<float, Grid<kHalfAlong, kHalfAcross>::kPadded>;
+
+float sum_of(const WideLane& v) { return sum_lane(low_half(v) + high_half(v)); }
+
+float dot(const Patch& a, const Patch& b) {
+  WideLane sum{};
+  for (std::size_t i = 0; i < a.size(); i += kWideLanes) {
+    sum += load_lane<WideLane>(&a[i]) * load_lane<WideLane>(&b[i]);
+  }
+  return sum_of(sum);
 }
 
-float dot(const float* a, const float* b) {
-  Lane sum{};
-  std::size_t i = 0;
-  for (; i + kLanes <= kPatchSize; i += kLanes) sum += load_lane(a + i) * load_lane(b + i);
-  for (; i < kPatchSize; ++i) sum[0] += a[i] * b[i];
-  return sum_lane(sum);
-}
-
-using Patch = std::array<float, kPatchSize>;
-
+/// Whatever lay behind the pixels becomes zero.
 void remove_mean(Patch* patch) {
-  const float mean = sum_of(patch->data()) / kPatchSize;
-  for (float& v : *patch) v -= mean;
+  Patch& p = *patch;
+  std::fill(p.begin() + kPatchSize, p.end(), 0.0F);
+  WideLane sum{};
+  for (std::size_t i = 0; i < p.size(); i += kWideLanes) sum += load_lane<WideLane>(&p[i]);
+  const float mean = sum_of(sum) / kPatchSize;
+  for (std::size_t i = 0; i < kPatchSize; ++i) p[i] -= mean;
 }
 
 /// Zero mean, unit length; all zero when there is no texture.
 void normalize(Patch* patch) {
   remove_mean(patch);
-  const float energy = dot(patch->data(), patch->data());
+  const float energy = dot(*patch, *patch);
   const float scale = energy > 1e-3F ? 1.0F / std::sqrt(energy) : 0.0F;
   for (float& v : *patch) v *= scale;
 }
@@ -113,47 +126,57 @@ Mat2f axes_of(const Vec2& direction) {
 /// whole lanes of unseen columns behind the last.
 struct Strip {
   static constexpr int kColumns = CorrelationProfile::kCapacity + kPatchAlong - 1;
-  static constexpr std::size_t kStride = kColumns + 4 * kLanes;
+  static constexpr std::size_t kStride = kColumns + 4 * kWideLanes;
   int size = 0;
   std::array<std::array<float, kStride>, kPatchAcross> rows;
   std::array<float, kStride> sum, energy, rho;
   std::array<std::int32_t, kStride> seen;  ///< -1 or 0.
 };
-static_assert(kNodeSteps % kLanes == 0);
+static_assert(kNodeSteps % kWideLanes == 0 && kSegmentSteps % kWideLanes == 0);
 
-/// Appends the first `count` of four columns from `from` on, in steps of `step`; at most all.
-void append_columns(const ImageF& image, const Vec2f& from, const Vec2f& step, const Vec2f& across,
-                    int count, Strip* strip) {
-  const auto k = static_cast<std::size_t>(strip->size);
-  const Lane index = {0.0F, 1.0F, 2.0F, 3.0F};
-  const Lane x = from.x() + index * step.x();
-  const Lane y = from.y() + index * step.y();
-  const Vec2f reach = kHalfAcross * across.cwiseAbs();
-  const LaneMask seen = (x >= reach.x()) & (y >= reach.y()) &
-                        (x < static_cast<float>(image.width() - 1) - reach.x()) &
-                        (y < static_cast<float>(image.height() - 1) - reach.y());
-  const Lane zero = lane_of(0.0F);
-  Lane sum = zero;
-  Lane energy = zero;
-  for (int j = 0; j < kPatchAcross; ++j) {
-    const auto offset = static_cast<float>(j - kHalfAcross);
-    // A pixel that can be read, where the column is not seen.
-    const Lane value = sample_lanes(image, seen ? x + offset * across.x() : zero,
-                                    seen ? y + offset * across.y() : zero);
-    store_lane(value, &strip->rows[static_cast<std::size_t>(j)][k]);
-    sum += value;
-    energy += value * value;
+/// Columns from a pixel on, in steps.
+struct ColumnRun {
+  Vec2f from, step, across;
+};
+
+/// Writes `count` columns from column k on, and up to whole lanes more.
+struct SampleColumns {
+  template <class F>
+  SOVO_LANE_FUNCTION static void run(const ImageF& image, const ColumnRun& columns, int count,
+                                     std::size_t k, Strip* strip) {
+    const Vec2f reach = kHalfAcross * columns.across.cwiseAbs();
+    const F zero = lane_of<F>(0.0F);
+    for (int begin = 0; begin < count; begin += static_cast<int>(lanes_of<F>)) {
+      const F index = lane_index<F>() + static_cast<float>(begin);
+      const F x = columns.from.x() + index * columns.step.x();
+      const F y = columns.from.y() + index * columns.step.y();
+      const MaskOf<F> seen = (x >= reach.x()) & (y >= reach.y()) &
+                             (x < static_cast<float>(image.width() - 1) - reach.x()) &
+                             (y < static_cast<float>(image.height() - 1) - reach.y());
+      F sum = zero;
+      F energy = zero;
+      for (int j = 0; j < kPatchAcross; ++j) {
+        const auto offset = static_cast<float>(j - kHalfAcross);
+        // A pixel that can be read, where the column is not seen.
+        const F u = x + offset * columns.across.x();
+        const F v = y + offset * columns.across.y();
+        const F value = sample_lanes(image, F(seen ? u : zero), F(seen ? v : zero));
+        store_lane(value, &strip->rows[static_cast<std::size_t>(j)][k]);
+        sum += value;
+        energy += value * value;
+      }
+      store_lane(sum, &strip->sum[k]);
+      store_lane(energy, &strip->energy[k]);
+      store_mask(seen, &strip->seen[k]);
+      k += lanes_of<F>;
+    }
   }
-  store_lane(sum, &strip->sum[k]);
-  store_lane(energy, &strip->energy[k]);
-  __builtin_memcpy(&strip->seen[k], &seen, sizeof(seen));
-  strip->size += count;
-}
+};
 
 /// Columns that are read with the last ones, but are none.
 void pad(Strip* strip) {
   const auto k = static_cast<std::size_t>(strip->size);
-  constexpr std::size_t kPadding = 2 * kLanes + kPatchAlong;
+  constexpr std::size_t kPadding = 2 * kWideLanes + kPatchAlong;
   for (auto& row : strip->rows) std::fill_n(&row[k], kPadding, 0.0F);
   std::fill_n(&strip->sum[k], kPadding, 0.0F);
   std::fill_n(&strip->energy[k], kPadding, 0.0F);
@@ -189,10 +212,9 @@ void sample_strip(const PatchSearch& search, int level, double rho_min, double r
       strip->rho[static_cast<std::size_t>(strip->size + count)] = static_cast<float>(at);
       if (at > rho_max) ++after;
     }
-    for (int i = 0; i < count; i += static_cast<int>(kLanes)) {
-      append_columns(image, from + static_cast<float>(i) * step, step, across,
-                     std::min(static_cast<int>(kLanes), count - i), strip);
-    }
+    run_kernel<SampleColumns>(image, ColumnRun{from, step, across}, count,
+                              static_cast<std::size_t>(strip->size), strip);
+    strip->size += count;
     const bool inside = strip->seen[static_cast<std::size_t>(strip->size - 1)] != 0;
     if (entered && !inside) return;
     entered = entered || inside;
@@ -201,45 +223,68 @@ void sample_strip(const PatchSearch& search, int level, double rho_min, double r
   }
 }
 
-/// The base patch as the target would see it at `rho`, normalized.
-bool base_patch(const PatchSearch& search, int level, double rho, Patch* patch) {
-  const auto point = search.curve.at(rho);
-  if (!point) return false;
-  const Mat2f base_from_target = point->target_from_base.inverse().cast<float>();
-  if (!base_from_target.allFinite()) return false;
-  const Mat2f axes = base_from_target * axes_of(point->derivative);
-  const Vec2f center = to_level(search.pixel, level).cast<float>();
-  if (!sample_grid<kHalfAlong, kHalfAcross>(search.base->level(level), center, axes,
-                                            patch->data())) {
-    return false;
-  }
-  normalize(patch);
-  return true;
-}
+/// The base patch as the target would see it, normalized.
+class BasePatch {
+ public:
+  BasePatch(const PatchSearch& search, int level) : search_(search), level_(level) {}
 
-/// Correlation of the patch with the four windows that begin at column `first` and after it.
-Lane window_scores(const Strip& strip, std::size_t first, const Patch& patch) {
-  Lane sum{};
-  Lane energy{};
-  LaneMask seen = {-1, -1, -1, -1};
-  std::array<Lane, kPatchAcross> products{};
-  for (std::size_t i = 0; i < kPatchAlong; ++i) {
-    sum += load_lane(&strip.sum[first + i]);
-    energy += load_lane(&strip.energy[first + i]);
-    LaneMask column;
-    __builtin_memcpy(&column, &strip.seen[first + i], sizeof(column));
-    seen &= column;
-    for (std::size_t j = 0; j < kPatchAcross; ++j) {
-      products[j] += patch[i * kPatchAcross + j] * load_lane(&strip.rows[j][first + i]);
+  /// As seen at `rho`. False when it leaves the image. Where it has hardly turned or stretched
+  /// since the last time, as between two cameras that look in parallel, it stays.
+  bool look_from(double rho) {
+    constexpr float kSame = 0.01F;  // a corner moves by less than 0.06 px
+    const auto point = search_.curve.at(rho);
+    if (!point) return false;
+    const Mat2f base_from_target = point->target_from_base.inverse().cast<float>();
+    if (!base_from_target.allFinite()) return false;
+    const Mat2f axes = base_from_target * axes_of(point->derivative);
+    if (seen_ && (axes - axes_).cwiseAbs().maxCoeff() < kSame) return fits_;
+    const Vec2f center = to_level(search_.pixel, level_).cast<float>();
+    seen_ = true;
+    axes_ = axes;
+    fits_ =
+        sample_grid<kHalfAlong, kHalfAcross>(search_.base->level(level_), center, axes, &patch_);
+    if (fits_) normalize(&patch_);
+    return fits_;
+  }
+  const Patch& patch() const { return patch_; }
+
+ private:
+  const PatchSearch& search_;
+  int level_;
+  bool seen_ = false, fits_ = false;
+  Mat2f axes_ = Mat2f::Zero();
+  alignas(32) Patch patch_{};
+};
+
+/// Correlation of the patch with the windows that begin at the columns from `begin` to `end`, and
+/// up to whole lanes more.
+struct WindowScores {
+  template <class F>
+  SOVO_LANE_FUNCTION static void run(const Strip& strip, const Patch& patch, int begin, int end,
+                                     float* score) {
+    for (int at = begin; at < end; at += static_cast<int>(lanes_of<F>)) {
+      const auto first = static_cast<std::size_t>(at);
+      F sum{};
+      F energy{};
+      MaskOf<F> seen = ~MaskOf<F>{};
+      F products[kPatchAcross] = {};
+      for (std::size_t i = 0; i < kPatchAlong; ++i) {
+        sum += load_lane<F>(&strip.sum[first + i]);
+        energy += load_lane<F>(&strip.energy[first + i]);
+        seen &= load_mask<MaskOf<F>>(&strip.seen[first + i]);
+        for (std::size_t j = 0; j < kPatchAcross; ++j) {
+          products[j] += patch[i * kPatchAcross + j] * load_lane<F>(&strip.rows[j][first + i]);
+        }
+      }
+      F product = products[0];
+      for (std::size_t j = 1; j < kPatchAcross; ++j) product += products[j];
+      const F variance = energy - sum * sum / static_cast<float>(kPatchSize);
+      const F zero = lane_of<F>(0.0F);
+      const F visible = variance < 1e-2F * kPatchSize ? zero : F(product / sqrt_lane(variance));
+      store_lane(F(seen ? visible : lane_of<F>(CorrelationProfile::kUnseen)), score + first);
     }
   }
-  Lane product = products[0];
-  for (std::size_t j = 1; j < kPatchAcross; ++j) product += products[j];
-  const Lane variance = energy - sum * sum / static_cast<float>(kPatchSize);
-  const Lane zero = lane_of(0.0F);
-  const Lane score = variance < 1e-2F * kPatchSize ? zero : product / sqrt_lane(variance);
-  return seen ? score : lane_of(CorrelationProfile::kUnseen);
-}
+};
 
 }  // namespace
 
@@ -277,21 +322,17 @@ bool correlate(const PatchSearch& search, int level, double rho_min, double rho_
   pad(&strip);
   profile->size = std::max(0, strip.size - (kPatchAlong - 1));
   std::copy_n(strip.rho.begin() + kHalfAlong, profile->size, profile->rho.begin());
-  Patch patch{};
+  BasePatch base(search, level);
   bool fits = false;
   for (int begin = 0; begin < profile->size; begin += kSegmentSteps) {
     const int end = std::min(begin + kSegmentSteps, profile->size);
     const int middle = (begin + end) / 2 + kHalfAlong;
-    const bool usable = base_patch(search, level, static_cast<double>(strip.rho[middle]), &patch);
-    fits = fits || usable;
-    float* score = profile->score.data() + begin;
-    if (!usable) {
-      std::fill(score, score + (end - begin), CorrelationProfile::kUnseen);
-      continue;
-    }
-    for (int i = begin; i < end; i += static_cast<int>(kLanes)) {
-      store_lane(window_scores(strip, static_cast<std::size_t>(i), patch),
-                 profile->score.data() + i);
+    float* score = profile->score.data();
+    if (base.look_from(static_cast<double>(strip.rho[middle]))) {
+      fits = true;
+      run_kernel<WindowScores>(strip, base.patch(), begin, end, score);
+    } else {
+      std::fill(score + begin, score + end, CorrelationProfile::kUnseen);
     }
   }
   return fits;
@@ -310,13 +351,12 @@ struct Template {
 
 bool make_template(const PatchSearch& search, const CurvePoint& point, Template* out) {
   constexpr int kColumn = kPatchAcross + 2;
-  std::array<float, (kPatchAlong + 2) * kColumn> grid;
+  alignas(32) std::array<float, Grid<kHalfAlong + 1, kHalfAcross + 1>::kPadded> grid;
   out->axes = axes_of(point.derivative);
   const Mat2f base_from_target = point.target_from_base.inverse().cast<float>();
   if (!base_from_target.allFinite()) return false;
-  if (!sample_grid<kHalfAlong + 1, kHalfAcross + 1>(search.base->level(0),
-                                                    search.pixel.cast<float>(),
-                                                    base_from_target * out->axes, grid.data())) {
+  if (!sample_grid<kHalfAlong + 1, kHalfAcross + 1>(
+          search.base->level(0), search.pixel.cast<float>(), base_from_target * out->axes, &grid)) {
     return false;
   }
   for (int i = 0; i < kPatchAlong; ++i) {
@@ -336,8 +376,7 @@ bool make_template(const PatchSearch& search, const CurvePoint& point, Template*
   const std::array<const Patch*, 4> columns = {&out->value, &out->along, &out->shear, &out->across};
   for (std::size_t i = 0; i < columns.size(); ++i) {
     for (std::size_t j = 0; j <= i; ++j) {
-      out->normal(i, j) = out->normal(j, i) =
-          static_cast<double>(dot(columns[i]->data(), columns[j]->data()));
+      out->normal(i, j) = out->normal(j, i) = static_cast<double>(dot(*columns[i], *columns[j]));
     }
   }
   out->normal(2, 2) += kShearPrior;
@@ -361,18 +400,17 @@ struct Fit {
 
 bool fit(const PatchSearch& search, const Template& base, const Placement& at, bool both,
          Fit* out) {
-  Patch target;
+  alignas(32) Patch target;
   Mat2f axes = base.axes;
   axes.col(1) += static_cast<float>(at.shear) * axes.col(0);
   if (!sample_grid<kHalfAlong, kHalfAcross>(search.target->level(0), at.pixel.cast<float>(), axes,
-                                            target.data())) {
+                                            &target)) {
     return false;
   }
   remove_mean(&target);
-  const Vec4 b(static_cast<double>(dot(base.value.data(), target.data())),
-               static_cast<double>(dot(base.along.data(), target.data())),
-               static_cast<double>(dot(base.shear.data(), target.data())),
-               static_cast<double>(dot(base.across.data(), target.data())));
+  const Vec4 b(
+      static_cast<double>(dot(base.value, target)), static_cast<double>(dot(base.along, target)),
+      static_cast<double>(dot(base.shear, target)), static_cast<double>(dot(base.across, target)));
   Vec4 x = Vec4::Zero();
   if (both) {
     x = solve_small(base.normal, b);
@@ -380,7 +418,7 @@ bool fit(const PatchSearch& search, const Template& base, const Placement& at, b
     x.head<3>() = base.normal.topLeftCorner<3, 3>().inverse() * b.head<3>();
   }
   if (!(x[0] > 1e-3) || !x.allFinite()) return false;
-  const double energy = static_cast<double>(dot(target.data(), target.data()));
+  const double energy = static_cast<double>(dot(target, target));
   out->along = x[1] / x[0];
   out->shear = x[2] / x[0];
   out->across = x[3] / x[0];

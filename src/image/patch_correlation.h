@@ -29,7 +29,7 @@ struct CorrelationProfile {
   static constexpr float kUnseen = -2.0F;  ///< Score where the patch leaves an image.
 
   int size = 0;
-  std::array<float, kCapacity + 4> score;  ///< Written four at a time.
+  std::array<float, kCapacity + 8> score;  ///< Written eight at a time at most.
   std::array<float, kCapacity> rho;        ///< Inverse depth of each step.
 
   float step_rho(int i) const {

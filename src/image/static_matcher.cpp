@@ -214,14 +214,17 @@ StaticMatcher::StaticMatcher(const StaticMatcherConfig& config, const StereoRig&
   assert(rig.left.distortion == Distortion::kNone);
 }
 
+std::pair<float, float> StaticMatcher::whole_range() const {
+  const double least = config_.max_depth > 0.0 ? 1.0 / config_.max_depth : 0.0;
+  return {static_cast<float>(least), static_cast<float>(1.0 / config_.min_depth)};
+}
+
 StaticMatch StaticMatcher::match(const ImagePyramid& left, const ImagePyramid& right, float u,
                                  float v, const MatchRequest& request) const {
   StaticMatch out;
   const PatchSearch search = forward_search(rig_, left, right, Vec2(u, v));
-  const auto& known = request.inverse_depth_range;
-  Range range = known ? Range{static_cast<double>(known->first), static_cast<double>(known->second)}
-                      : Range{config_.max_depth > 0.0 ? 1.0 / config_.max_depth : 0.0,
-                              1.0 / config_.min_depth};
+  const auto [least, greatest] = request.inverse_depth_range.value_or(whole_range());
+  Range range{static_cast<double>(least), static_cast<double>(greatest)};
   const bool clamp = range.min >= 0.0;
   const auto farthest = search.curve.at(range.min);
   if (!farthest) return out;

@@ -66,6 +66,9 @@ class StaticMatcher {
  public:
   StaticMatcher(const StaticMatcherConfig& config, const StereoRig& rig);
 
+  /// Inverse depths that are searched where the request tells none: least, greatest [1/m].
+  std::pair<float, float> whole_range() const;
+
   /// Matches one left pixel (level 0, sub-pixel). Thread-safe.
   StaticMatch match(const ImagePyramid& left, const ImagePyramid& right, float u, float v,
                     const MatchRequest& request = {}) const;

@@ -76,6 +76,26 @@ bool fit_center(const CameraModel& raw, double max_fov, CameraModel* pinhole) {
          field_of_view(pinhole->height, pinhole->fy, pinhole->cy) <= max_fov;
 }
 
+/// Interpolates each pixel of `out` in `raw`; 0 where its offset is negative.
+struct Remap {
+  template <class F>
+  SOVO_LANE_FUNCTION static void run(const ImageF& raw, const std::int32_t* offset, const float* fx,
+                                     const float* fy, ImageF* out) {
+    constexpr std::size_t n = lanes_of<F>;
+    const std::size_t size = out->size();
+    for (std::size_t i = 0; i < size; i += n) {
+      // The last pixels are computed with some of those before them.
+      i = std::min(i, size - n);
+      const auto at = load_mask<MaskOf<F>>(offset + i);
+      std::int32_t readable[n];
+      store_mask(MaskOf<F>(at < 0 ? MaskOf<F>{} : at), readable);
+      const F value = blend_lanes(raw.data(), raw.width(), readable, load_lane<F>(fx + i),
+                                  load_lane<F>(fy + i));
+      store_lane(F(at < 0 ? F{} : value), out->data() + i);
+    }
+  }
+};
+
 }  // namespace
 
 CameraModel optimal_pinhole(const CameraModel& raw, const UndistortionConfig& config) {
@@ -104,7 +124,7 @@ Undistorter::Undistorter(const CameraModel& raw, const CameraModel& pinhole)
       raw_width_(raw.width),
       raw_height_(raw.height) {
   assert(pinhole.distortion == Distortion::kNone && raw.width >= 2 && raw.height >= 2);
-  assert(pinhole.width * pinhole.height >= static_cast<int>(kLanes));
+  assert(pinhole.width * pinhole.height >= static_cast<int>(kWideLanes));
   identity_ = raw.distortion == Distortion::kNone && raw.width == pinhole.width &&
               raw.height == pinhole.height && raw.fx == pinhole.fx && raw.fy == pinhole.fy &&
               raw.cx == pinhole.cx && raw.cy == pinhole.cy;
@@ -135,18 +155,7 @@ void Undistorter::apply(const ImageF& raw, ImageF* out) const {
     std::copy_n(raw.data(), raw.size(), out->data());
     return;
   }
-  const std::size_t size = out->size();
-  const LaneMask none{};
-  for (std::size_t i = 0; i < size; i += kLanes) {
-    // The last pixels are computed with some of those before them.
-    i = std::min(i, size - kLanes);
-    LaneMask offset;
-    __builtin_memcpy(&offset, &offset_[i], sizeof(offset));
-    const LaneMask readable = offset < 0 ? none : offset;
-    const Lane value =
-        blend_lanes(raw.data(), raw_width_, readable, load_lane(&fx_[i]), load_lane(&fy_[i]));
-    store_lane(offset < 0 ? Lane{} : value, out->data() + i);
-  }
+  run_kernel<Remap>(raw, offset_.data(), fx_.data(), fy_.data(), out);
 }
 
 Vec2 Undistorter::source(int x, int y) const {

@@ -10,7 +10,8 @@ namespace sovo {
 
 namespace {
 
-constexpr int kMatchBlock = 64;
+constexpr std::size_t kMatchBlock = 64;
+constexpr std::size_t kScoutStride = 8;
 /// So many keyframes wait for a scale, the newest ones: a map may go without one for days.
 constexpr std::size_t kMostWaiting = 200;
 
@@ -52,6 +53,23 @@ void set_points(const KeyframePoints& points, const ImageF& image, KeyframeOutpu
 DepthProposal proposal_of(const StaticMatch& match) {
   if (match.state != MatchState::kMatched) return {};
   return {match.inverse_depth, match.sigma};
+}
+
+/// The scouts are matched over the whole range; the others then no nearer than half as far as the
+/// nearest of those: a long search costs most of the time, and may go astray.
+std::pair<float, float> range_of_scouts(const std::vector<StaticMatch>& matches,
+                                        std::pair<float, float> whole) {
+  constexpr int kFewest = 30;
+  constexpr float kNearer = 2.0F;
+  float nearest = 0.0F;
+  int matched = 0;
+  for (std::size_t i = 0; i < matches.size(); i += kScoutStride) {
+    if (matches[i].state != MatchState::kMatched) continue;
+    nearest = std::max(nearest, matches[i].inverse_depth);
+    ++matched;
+  }
+  if (matched < kFewest) return whole;
+  return {whole.first, std::clamp(kNearer * nearest, whole.first, whole.second)};
 }
 
 }  // namespace
@@ -187,13 +205,23 @@ std::vector<StaticMatch> MapSegment::match_all(const ImagePyramid& left, const I
                                                const std::vector<SelectedPixel>& pixels) const {
   const ScopedStage stage(observer_, Stage::kStaticMatching);
   std::vector<StaticMatch> matches(pixels.size());
-  const int total = static_cast<int>(pixels.size());
-  pool_->run((total + kMatchBlock - 1) / kMatchBlock, [&](int block) {
-    for (int i = block * kMatchBlock; i < std::min(total, (block + 1) * kMatchBlock); ++i) {
-      const auto k = static_cast<std::size_t>(i);
-      matches[k] = matcher_.match(left, right, pixels[k].x, pixels[k].y);
-    }
-  });
+  const auto match_some = [&](const std::vector<std::size_t>& which, const MatchRequest& request) {
+    const std::size_t blocks = (which.size() + kMatchBlock - 1) / kMatchBlock;
+    pool_->run(static_cast<int>(blocks), [&](int block) {
+      const std::size_t begin = static_cast<std::size_t>(block) * kMatchBlock;
+      for (std::size_t i = begin; i < std::min(which.size(), begin + kMatchBlock); ++i) {
+        const SelectedPixel& pixel = pixels[which[i]];
+        matches[which[i]] = matcher_.match(left, right, pixel.x, pixel.y, request);
+      }
+    });
+  };
+  std::vector<std::size_t> scouts;
+  std::vector<std::size_t> others;
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    (i % kScoutStride == 0 ? scouts : others).push_back(i);
+  }
+  match_some(scouts, {});
+  match_some(others, {.inverse_depth_range = range_of_scouts(matches, matcher_.whole_range())});
   return matches;
 }
 

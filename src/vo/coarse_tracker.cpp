@@ -31,25 +31,26 @@ struct Ranked {
 constexpr double kExplainsNothing = 1e9;
 constexpr std::size_t kFavourites = 4;  ///< Motions looked at again for each that is kept.
 
-/// Upper triangle of a 9x9 Gram matrix, four lanes each.
-using Accumulator = std::array<Lane, 45>;
+/// Prior on a frame's brightness: that of the reference.
+struct BrightnessPrior {
+  Vec8 weight = Vec8::Zero();
+  Affine mean;
 
-void accumulate_row(const std::array<Lane, 9>& row, Lane weight, Accumulator* sums) {
-  std::size_t k = 0;
-  for (std::size_t i = 0; i < 9; ++i) {
-    const Lane wi = weight * row[i];
-    for (std::size_t j = i; j < 9; ++j) (*sums)[k++] += wi * row[j];
+  BrightnessPrior(const TrackerConfig& config, const Affine& reference) : mean(reference) {
+    weight[6] = config.brightness_prior_a;
+    weight[7] = config.brightness_prior_b;
   }
-}
-
-void spill(Accumulator* sums, std::array<double, 45>* total) {
-  for (std::size_t k = 0; k < 45; ++k) {
-    const Lane v = (*sums)[k];
-    (*total)[k] += (static_cast<double>(v[0]) + static_cast<double>(v[1])) +
-                   (static_cast<double>(v[2]) + static_cast<double>(v[3]));
-    (*sums)[k] = Lane{0, 0, 0, 0};
+  Vec8 error(const Affine& a) const {
+    Vec8 error = Vec8::Zero();
+    error[6] = a.a - mean.a;
+    error[7] = a.b - mean.b;
+    return error;
   }
-}
+  Vec8 gradient(const Affine& a) const { return weight.cwiseProduct(error(a)); }
+  double energy(const Affine& a, int in_view) const {
+    return weight.dot(error(a).cwiseAbs2()) / std::max(1, in_view);
+  }
+};
 
 /// Levenberg-Marquardt step in states divided by `units`; a small damping extrapolates it.
 Vec8 damped_step(Mat8 H, const Vec8& gradient, const Vec8& prior, const Vec8& units,
@@ -96,131 +97,38 @@ Vec8 tracker_units(double mean_rho) {
 
 }  // namespace
 
-void CoarseTracker::Warped::reserve(std::size_t size) {
+void WarpedPoints::reserve(std::size_t size) {
   for (auto* v : {&x, &y, &rho, &gx, &gy, &residual, &weight, &colour}) {
     if (v->size() < size) v->resize(size);
   }
 }
 
-CoarseTracker::Warp::Warp(const CameraModel& camera, const SE3& T)
-    : RKi((T.rotation_matrix() * camera.matrix().inverse()).cast<float>()),
-      t(T.translation().cast<float>()),
-      fx(static_cast<float>(camera.fx)),
-      fy(static_cast<float>(camera.fy)),
-      cx(static_cast<float>(camera.cx)),
-      cy(static_cast<float>(camera.cy)) {}
-
-CoarseTracker::Projected CoarseTracker::project(const ReferenceLevel& level, std::size_t i,
-                                                const ImageF& image, const Warp& warp) {
-  // The last points may not fill a lane.
-  const std::size_t left = std::min(kLanes, level.size() - i);
-  const auto load = [&](const AlignedVector<float>& v) {
-    if (left == kLanes) return load_lane(&v[i]);
-    std::array<float, kLanes> padded{};
-    std::copy_n(v.begin() + static_cast<std::ptrdiff_t>(i), left, padded.begin());
-    return load_lane(padded.data());
-  };
-  Projected out;
-  const Lane u = load(level.u);
-  const Lane v = load(level.v);
-  const Lane rho = load(level.rho);
-  out.colour = load(level.colour);
-  const auto& m = warp.RKi;
-  const Lane px = m(0, 0) * u + m(0, 1) * v + m(0, 2) + warp.t.x() * rho;
-  const Lane py = m(1, 0) * u + m(1, 1) * v + m(1, 2) + warp.t.y() * rho;
-  const Lane pz = m(2, 0) * u + m(2, 1) * v + m(2, 2) + warp.t.z() * rho;
-  const Lane iz = 1.0F / pz;
-  out.x = px * iz;
-  out.y = py * iz;
-  out.rho = rho * iz;
-  const Lane ku = warp.fx * out.x + warp.cx;
-  const Lane kv = warp.fy * out.y + warp.cy;
-  // Written so that NaN counts as outside.
-  const LaneMask index = {0, 1, 2, 3};
-  out.in_view = (pz > 0.0F) & (ku >= 2.0F) & (kv >= 2.0F) &
-                (ku < static_cast<float>(image.width() - 3)) &
-                (kv < static_cast<float>(image.height() - 3)) & (index < static_cast<int>(left));
-  // Outside, a pixel that can be read.
-  const Lane one = lane_of(1.0F);
-  const Lane su = out.in_view ? ku : one;
-  const Lane sv = out.in_view ? kv : one;
-  const LaneMask iu = __builtin_convertvector(su, LaneMask);
-  const LaneMask iv = __builtin_convertvector(sv, LaneMask);
-  out.fx = su - __builtin_convertvector(iu, Lane);
-  out.fy = sv - __builtin_convertvector(iv, Lane);
-  for (std::size_t k = 0; k < kLanes; ++k) {
-    out.offset[k] = iv[k] * image.width() + iu[k];
-    const float* pixel = image.data() + out.offset[k];
-    for (std::ptrdiff_t row = -1; row <= 2; ++row) {
-      __builtin_prefetch(pixel + row * image.width());
-    }
-  }
-  return out;
-}
-
 double CoarseTracker::residuals(const ReferenceLevel& level, const ImageF& image, const SE3& T,
                                 const BrightnessTransfer& transfer, double cutoff,
                                 Linearization* out) {
-  const Warp warp(level.camera, T);
-  const auto gain = static_cast<float>(transfer.gain);
-  const auto bias = static_cast<float>(transfer.bias);
-  const Lane huber = lane_of(static_cast<float>(config_.huber));
-  const Lane limit = lane_of(static_cast<float>(cutoff));
-  const Lane max_energy = 2.0F * huber * limit - huber * huber;
-  const Lane zero = lane_of(0.0F);
-  const Lane one = lane_of(1.0F);
-  warped_.reserve(level.size() + kLanes);
-  std::size_t n = 0;
-  LaneMask in_view{};
-  LaneMask inliers{};
-  using Energies = double __attribute__((vector_size(4 * sizeof(double))));
-  Energies energies{};
-  std::array<Projected, kAhead> projected;
-  for (std::size_t begin = 0; begin < level.size(); begin += kAhead * kLanes) {
-    const std::size_t end = std::min(level.size(), begin + kAhead * kLanes);
-    for (std::size_t i = begin; i < end; i += kLanes) {
-      projected[(i - begin) / kLanes] = project(level, i, image, warp);
-    }
-    for (std::size_t i = begin; i < end; i += kLanes) {
-      const Projected& p = projected[(i - begin) / kLanes];
-      const LaneSample s = sample_lanes_with_gradient(image, p.offset.data(), p.fx, p.fy);
-      const Lane r = s.value - (gain * p.colour + bias);
-      const Lane magnitude = abs_lane(r);
-      const LaneMask inlier = p.in_view & (magnitude <= limit);
-      const Lane hw = min_lane(one, huber / magnitude);
-      const Lane energy = inlier ? hw * r * r * (2.0F - hw) : max_energy;
-      energies += __builtin_convertvector(p.in_view ? energy : zero, Energies);
-      in_view -= p.in_view;
-      inliers -= inlier;
-      if (none_of(inlier)) continue;
-      // Outliers stay among them with weight and values zero.
-      store_lane(inlier ? p.x : zero, &warped_.x[n]);
-      store_lane(inlier ? p.y : zero, &warped_.y[n]);
-      store_lane(inlier ? p.rho : zero, &warped_.rho[n]);
-      store_lane(inlier ? s.gx * warp.fx : zero, &warped_.gx[n]);
-      store_lane(inlier ? s.gy * warp.fy : zero, &warped_.gy[n]);
-      store_lane(inlier ? r : zero, &warped_.residual[n]);
-      store_lane(inlier ? hw : zero, &warped_.weight[n]);
-      store_lane(p.colour, &warped_.colour[n]);
-      n += kLanes;
-    }
-  }
-  warped_.n = n;
-  out->in_view = in_view[0] + in_view[1] + in_view[2] + in_view[3];
-  out->inliers = inliers[0] + inliers[1] + inliers[2] + inliers[3];
+  warped_.reserve(level.size() + kTrackedGroup);
+  ResidualSums sums;
+  run_kernel<ResidualPass>(
+      TrackedPoints{level, image, Warp(level.camera, T)},
+      ResidualConfig{static_cast<float>(transfer.gain), static_cast<float>(transfer.bias),
+                     static_cast<float>(config_.huber), static_cast<float>(cutoff)},
+      warped_.arrays(), &sums);
+  warped_.n = sums.n;
+  out->in_view = sums.in_view;
+  out->inliers = sums.inliers;
   out->saturated = out->in_view > 0 ? 1.0 - static_cast<double>(out->inliers) / out->in_view : 1.0;
-  const double energy = (energies[0] + energies[1]) + (energies[2] + energies[3]);
-  out->energy = out->in_view > 0 ? energy / out->in_view : 1e10;
+  out->energy = out->in_view > 0 ? sums.energy / out->in_view : 1e10;
   return out->energy;
 }
 
 double CoarseTracker::correlation(const ReferenceLevel& level, const ImageF& image, const SE3& T) {
-  const Warp warp(level.camera, T);
+  const TrackedPoints points{level, image, Warp(level.camera, T)};
   const Lane zero = lane_of(0.0F);
   Moments moments;
   for (std::size_t i = 0; i < level.size(); i += kLanes) {
-    const Projected p = project(level, i, image, warp);
-    const LaneSample s = sample_lanes_with_gradient(image, p.offset.data(), p.fx, p.fy);
+    Projected<Lane> p;
+    project(points, i, &p);
+    const LaneSample s = sample_lanes_with_gradient(image, p.offset, p.fx, p.fy);
     const Lane x = p.in_view ? p.colour : zero;
     const Lane y = p.in_view ? s.value : zero;
     const Lane one = p.in_view ? lane_of(1.0F) : zero;
@@ -230,34 +138,12 @@ double CoarseTracker::correlation(const ReferenceLevel& level, const ImageF& ima
 }
 
 void CoarseTracker::normal_equations(const BrightnessTransfer& transfer, double reference_b,
-                                     Linearization* out) const {
-  Accumulator sums{};
-  std::array<double, 45> total{};
-  const auto gain = static_cast<float>(transfer.gain);
-  const auto b0 = static_cast<float>(reference_b);
-  const Lane one = {1, 1, 1, 1};
-  const Warped& w = warped_;
-  constexpr std::size_t kSpill = 256;
-  for (std::size_t i = 0; i < w.n; i += kLanes) {
-    const Lane x = load_lane(&w.x[i]);
-    const Lane y = load_lane(&w.y[i]);
-    const Lane rho = load_lane(&w.rho[i]);
-    const Lane gx = load_lane(&w.gx[i]);
-    const Lane gy = load_lane(&w.gy[i]);
-    const Lane along = x * gx + y * gy;
-    const std::array<Lane, 9> row = {rho * gx,
-                                     rho * gy,
-                                     -rho * along,
-                                     -(gy + y * along),
-                                     gx + x * along,
-                                     x * gy - y * gx,
-                                     gain * (b0 - load_lane(&w.colour[i])),
-                                     -one,
-                                     load_lane(&w.residual[i])};
-    accumulate_row(row, load_lane(&w.weight[i]), &sums);
-    if (i % kSpill == 0) spill(&sums, &total);
-  }
-  spill(&sums, &total);
+                                     Linearization* out) {
+  std::array<double, kGram> total{};
+  run_kernel<GramOfInliers>(
+      warped_.arrays(), warped_.n,
+      BrightnessJacobian{static_cast<float>(transfer.gain), static_cast<float>(reference_b)},
+      total.data());
   std::size_t k = 0;
   for (Eigen::Index i = 0; i < 9; ++i) {
     for (Eigen::Index j = i; j < 9; ++j, ++k) {
@@ -290,18 +176,7 @@ CoarseTracker::LevelOutcome CoarseTracker::align_level(const TrackingReference& 
     return brightness_transfer(reference.affine, reference.exposure_s, a, exposure_s);
   };
   const Vec8 units = tracker_units(reference.mean_rho);
-  Vec8 prior = Vec8::Zero();
-  prior[6] = config_.brightness_prior_a;
-  prior[7] = config_.brightness_prior_b;
-  const auto prior_error = [&](const Affine& a) {
-    Vec8 error = Vec8::Zero();
-    error[6] = a.a - reference.affine.a;
-    error[7] = a.b - reference.affine.b;
-    return error;
-  };
-  const auto prior_energy = [&](const Affine& a, int in_view) {
-    return prior.dot(prior_error(a).cwiseAbs2()) / std::max(1, in_view);
-  };
+  const BrightnessPrior prior(config_, reference.affine);
 
   LevelOutcome out;
   Linearization now;
@@ -311,13 +186,13 @@ CoarseTracker::LevelOutcome CoarseTracker::align_level(const TrackingReference& 
     residuals(points, image, *T, transfer_of(*affine), *cutoff, &now);
   }
   normal_equations(transfer_of(*affine), reference.affine.b, &now);
-  double energy = now.energy + prior_energy(*affine, now.in_view);
+  double energy = now.energy + prior.energy(*affine, now.in_view);
 
   double lambda = kStartLambda;
   bool accepted = false;
   for (int it = 0; it < max_iterations; ++it) {
-    const Vec8 gradient = now.b + prior.cwiseProduct(prior_error(*affine));
-    const Vec8 step = damped_step(now.H, gradient, prior, units, lambda);
+    const Vec8 gradient = now.b + prior.gradient(*affine);
+    const Vec8 step = damped_step(now.H, gradient, prior.weight, units, lambda);
     const Vec8 x = units.cwiseProduct(step);
     const bool converged = !(step.norm() > kStopNorm);
 
@@ -330,7 +205,7 @@ CoarseTracker::LevelOutcome CoarseTracker::align_level(const TrackingReference& 
     }
     Linearization next;
     residuals(points, image, new_T, transfer_of(new_affine), *cutoff, &next);
-    const double new_energy = next.energy + prior_energy(new_affine, next.in_view);
+    const double new_energy = next.energy + prior.energy(new_affine, next.in_view);
     accepted = new_energy < energy;
     if (accepted) {
       normal_equations(transfer_of(new_affine), reference.affine.b, &next);

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "sovo/image/lanes.h"
 #include "sovo/vo/direct_config.h"
+#include "sovo/vo/tracking_kernels.h"
 #include "sovo/vo/tracking_reference.h"
 
 namespace sovo {
@@ -68,8 +68,7 @@ class CoarseTracker {
   double residuals(const ReferenceLevel& level, const ImageF& image, const SE3& T,
                    const BrightnessTransfer& transfer, double cutoff, Linearization* out);
   static double correlation(const ReferenceLevel& level, const ImageF& image, const SE3& T);
-  void normal_equations(const BrightnessTransfer& transfer, double reference_b,
-                        Linearization* out) const;
+  void normal_equations(const BrightnessTransfer& transfer, double reference_b, Linearization* out);
   LevelOutcome align_level(const TrackingReference& reference, int level, const ImageF& image,
                            double exposure_s, double* cutoff, SE3* T, Affine* affine,
                            int max_iterations);
@@ -78,34 +77,7 @@ class CoarseTracker {
                                 std::vector<double>* best_rmse);
 
   TrackerConfig config_;
-
-  /// Motion and camera of a level, as the residuals want them.
-  struct Warp {
-    Warp(const CameraModel& camera, const SE3& T);
-    Eigen::Matrix3f RKi;
-    Eigen::Vector3f t;
-    float fx, fy, cx, cy;
-  };
-  /// Four reference points in the current frame.
-  struct Projected {
-    Lane x, y, rho;                           ///< In the normalized image; inverse depth.
-    Lane colour;                              ///< In the reference.
-    Lane fx, fy;                              ///< Position within its pixel.
-    std::array<std::int32_t, kLanes> offset;  ///< Of that pixel in the image.
-    LaneMask in_view;
-  };
-  /// Groups of points that are projected, and their images asked for, before the first is sampled.
-  static constexpr std::size_t kAhead = 8;
-  static Projected project(const ReferenceLevel& level, std::size_t i, const ImageF& image,
-                           const Warp& warp);
-
-  /// The inliers of the newest residual pass, whole lanes.
-  struct Warped {
-    AlignedVector<float> x, y, rho, gx, gy, residual, weight, colour;
-    std::size_t n = 0;
-    void reserve(std::size_t size);
-  };
-  Warped warped_;
+  WarpedPoints warped_;
 };
 
 /// RMS flow [px of level 0] of the reference's points under a motion: without its rotation, and

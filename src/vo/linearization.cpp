@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "sovo/image/lanes.h"
+#include "sovo/vo/pattern_kernels.h"
 #include "sovo/vo/plain_product.h"
 
 namespace sovo {
@@ -17,14 +17,6 @@ constexpr int tri(int i, int j) { return i * 4 - i * (i - 1) / 2 + (j - i); }
 constexpr float kMinGradientEnergy = 2.0F;
 
 constexpr float kMinDepth = 1e-6F;  ///< Least z_target / z_host of a point in front.
-
-/// The pattern's offsets, as lanes.
-constexpr std::array<Lane, 2> kOffsetX = {
-    Lane{kPattern[0].x, kPattern[1].x, kPattern[2].x, kPattern[3].x},
-    Lane{kPattern[4].x, kPattern[5].x, kPattern[6].x, kPattern[7].x}};
-constexpr std::array<Lane, 2> kOffsetY = {
-    Lane{kPattern[0].y, kPattern[1].y, kPattern[2].y, kPattern[3].y},
-    Lane{kPattern[4].y, kPattern[5].y, kPattern[6].y, kPattern[7].y}};
 
 /// Geometric Jacobian at the centre pixel, poses frozen (DSO eq. 13 ff.).
 void geometric_jacobian(const CameraModel& camera, const PairGeometry& g,
@@ -40,37 +32,23 @@ void geometric_jacobian(const CameraModel& camera, const PairGeometry& g,
   r->dv = {0.0F, rho_target * fy, -rho_target * y * fy, -(1.0F + y * y) * fy, x * y * fy, x * fy};
 }
 
-/// Weighted residuals and Gram matrix of (gx, gy, ja, jb), four pixels at a time.
 void sum_pattern(const ImageF& image, const PairGeometry& g, const Point& point,
                  const WindowConfig& config, const PatternProjection& at, LinearizedResidual* out) {
-  const Lane huber = lane_of(static_cast<float>(config.huber));
-  const Lane c2 = lane_of(static_cast<float>(config.gradient_constant * config.gradient_constant));
-  const Lane one = lane_of(1.0F);
-  std::array<Lane, 16> sums{};
-  for (std::size_t k = 0; k < kPatternSize; k += kLanes) {
-    const LaneSample s = sample_lanes_with_gradient(image, &at.offset[k], load_lane(&at.fx[k]),
-                                                    load_lane(&at.fy[k]));
-    const Lane colour = load_lane(&point.colour[k]);
-    const Lane residual = s.value - (g.gain * colour + g.bias);
-    const Lane gradient_squared = s.gx * s.gx + s.gy * s.gy;
-    const Lane w = 0.5F * (sqrt_lane(c2 / (c2 + gradient_squared)) + load_lane(&point.weight[k]));
-    const Lane hw = min_lane(one, huber / abs_lane(residual));
-    const Lane weight = sqrt_lane(hw) * w;
-    const Lane wr = weight * residual;
-    // d r / d (log-gain), d r / d bias of the target; the gain is the frozen one.
-    const Lane gx = weight * s.gx;
-    const Lane gy = weight * s.gy;
-    const Lane ja = -weight * g.frozen_gain * (colour - g.frozen_host_b);
-    const Lane jb = -weight;
-    const std::array<Lane, 16> terms = {
-        gx * gx, gx * gy, gx * ja, gx * jb, gy * gy, gy * ja, gy * jb, ja * ja,
-        ja * jb, jb * jb, gx * wr, gy * wr, ja * wr, jb * wr, wr * wr, wr * wr * (2.0F - hw)};
-    for (std::size_t i = 0; i < terms.size(); ++i) sums[i] += terms[i];
-  }
-  alignas(16) std::array<float, 16> totals;
-  for (std::size_t i = 0; i < 16; i += kLanes) {
-    store_lane(sum_lanes(sums[i], sums[i + 1], sums[i + 2], sums[i + 3]), &totals[i]);
-  }
+  const PatternInput in = {.image = &image,
+                           .offset = at.offset.data(),
+                           .fx = at.fx.data(),
+                           .fy = at.fy.data(),
+                           .colour = point.colour.data(),
+                           .weight = point.weight.data(),
+                           .gain = g.gain,
+                           .bias = g.bias,
+                           .frozen_gain = g.frozen_gain,
+                           .frozen_host_b = g.frozen_host_b,
+                           .huber = static_cast<float>(config.huber),
+                           .squared_gradient_constant = static_cast<float>(
+                               config.gradient_constant * config.gradient_constant)};
+  alignas(32) std::array<float, 16> totals;
+  run_kernel<SumPattern>(in, totals.data());
   std::copy_n(totals.begin(), 10, out->gram.begin());
   std::copy_n(totals.begin() + 10, 4, out->gram_r.begin());
   out->rr = totals[14];
@@ -101,28 +79,18 @@ void project_pattern(const Window& window, int host, int target, const Point& po
   out.y = frozen.y() * out.iz;
 
   const Eigen::Vector3f centre = plain_product(g.KRKi, ray) + g.Kt * out.rho;
-  LaneMask inside = {-1, -1, -1, -1};
-  for (std::size_t k = 0; k < 2; ++k) {
-    const Lane pz = centre.z() + g.KRKi(2, 0) * kOffsetX[k] + g.KRKi(2, 1) * kOffsetY[k];
-    const Lane px = centre.x() + g.KRKi(0, 0) * kOffsetX[k] + g.KRKi(0, 1) * kOffsetY[k];
-    const Lane py = centre.y() + g.KRKi(1, 0) * kOffsetX[k] + g.KRKi(1, 1) * kOffsetY[k];
-    const Lane iz = 1.0F / pz;
-    const Lane u = px * iz;
-    const Lane v = py * iz;
-    // Written so that NaN counts as outside.
-    inside &= (pz > 0.0F) & (u > 1.1F) & (v > 1.1F) & (u < static_cast<float>(image.width() - 3)) &
-              (v < static_cast<float>(image.height() - 3));
-    const LaneMask iu = __builtin_convertvector(u, LaneMask);
-    const LaneMask iv = __builtin_convertvector(v, LaneMask);
-    store_lane(u - __builtin_convertvector(iu, Lane), &out.fx[4 * k]);
-    store_lane(v - __builtin_convertvector(iv, Lane), &out.fy[4 * k]);
-    for (std::size_t i = 0; i < kLanes; ++i) out.offset[4 * k + i] = iv[i] * image.width() + iu[i];
-  }
+  const PatternWarp warp = {{centre.x(), centre.y(), centre.z()},
+                            {g.KRKi(0, 0), g.KRKi(1, 0), g.KRKi(2, 0)},
+                            {g.KRKi(0, 1), g.KRKi(1, 1), g.KRKi(2, 1)},
+                            image.width(),
+                            image.height()};
+  const bool inside =
+      run_kernel<PlacePattern>(warp, out.fx.data(), out.fy.data(), out.offset.data());
   const float iz = 1.0F / centre.z();
   out.centre_u = centre.x() * iz;
   out.centre_v = centre.y() * iz;
   out.centre_rho = out.rho * iz;
-  out.in_view = frozen.z() > kMinDepth && all_of(inside);
+  out.in_view = frozen.z() > kMinDepth && inside;
 }
 
 void prefetch_pattern(const Window& window, int target, const PatternProjection& projection) {

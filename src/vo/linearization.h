@@ -29,7 +29,7 @@ struct LinearizedResidual {
 /// Where a point's pattern falls in a target image by the current poses, and the geometric
 /// Jacobian of its centre at the frozen ones.
 struct PatternProjection {
-  alignas(16) std::array<float, kPatternSize> fx, fy;  ///< Position within its pixel.
+  alignas(32) std::array<float, kPatternSize> fx, fy;  ///< Position within its pixel.
   std::array<std::int32_t, kPatternSize> offset;       ///< Of that pixel in the image.
   float centre_u = 0.0F, centre_v = 0.0F, centre_rho = 0.0F;
   float x = 0.0F, y = 0.0F;     ///< Centre in the normalized target image, poses frozen.

@@ -1,5 +1,9 @@
 #include "sovo/vo/normal_equations.h"
 
+#include <algorithm>
+
+#include "sovo/image/lanes.h"
+
 namespace sovo {
 
 namespace {
@@ -7,39 +11,89 @@ namespace {
 /// Index of (i, j), i <= j, in the upper triangle of a 4x4 matrix stored by rows.
 constexpr std::size_t tri(std::size_t i, std::size_t j) { return i * 4 - i * (i + 1) / 2 + j; }
 
+/// Of the lanes that hold the last of eight states: those of a and b, zero before them.
+SOVO_LANE_FUNCTION Lane brightness_lanes(float a, float b, Lane /*of*/) {
+  return Lane{0.0F, 0.0F, a, b};
+}
+SOVO_LANE_FUNCTION WideLane brightness_lanes(float a, float b, WideLane /*of*/) {
+  return WideLane{0.0F, 0.0F, 0.0F, 0.0F, 0.0F, 0.0F, a, b};
+}
+
 /// J^T J and J^T r of a residual: with D = [du; dv] and the Gram matrix G of (gx, gy, ja, jb), its
 /// upper left block is D^T G_gg D.
-void add_relative(const LinearizedResidual& r, LaneBlock* sums) {
+template <class F>
+SOVO_LANE_FUNCTION void add_relative(const LinearizedResidual& r, LaneBlock* sums) {
   const auto& m = r.gram;
-  const Lane brightness_u = {0.0F, 0.0F, m[tri(0, 2)], m[tri(0, 3)]};
-  const Lane brightness_v = {0.0F, 0.0F, m[tri(1, 2)], m[tri(1, 3)]};
-  const Lane brightness_r = {0.0F, 0.0F, r.gram_r[2], r.gram_r[3]};
-  const std::array<Lane, 2> du = {load_lane(&r.du[0]), load_lane(&r.du[4])};
-  const std::array<Lane, 2> dv = {load_lane(&r.dv[0]), load_lane(&r.dv[4])};
-  const std::array<Lane, 2> gu = {m[tri(0, 0)] * du[0] + m[tri(0, 1)] * dv[0],
-                                  m[tri(0, 0)] * du[1] + m[tri(0, 1)] * dv[1] + brightness_u};
-  const std::array<Lane, 2> gv = {m[tri(0, 1)] * du[0] + m[tri(1, 1)] * dv[0],
-                                  m[tri(0, 1)] * du[1] + m[tri(1, 1)] * dv[1] + brightness_v};
-  for (std::size_t i = 0; i < 6; ++i) {
-    if (i < 4) sums->H[i][0] += r.du[i] * gu[0] + r.dv[i] * gv[0];
-    sums->H[i][1] += r.du[i] * gu[1] + r.dv[i] * gv[1];
+  for (std::size_t c = 0; c < 8; c += lanes_of<F>) {
+    const F du = load_lane<F>(&r.du[c]);
+    const F dv = load_lane<F>(&r.dv[c]);
+    F gu = m[tri(0, 0)] * du + m[tri(0, 1)] * dv;
+    F gv = m[tri(0, 1)] * du + m[tri(1, 1)] * dv;
+    F b = r.gram_r[0] * du + r.gram_r[1] * dv;
+    if (c + lanes_of<F> == 8) {
+      gu += brightness_lanes(m[tri(0, 2)], m[tri(0, 3)], F{});
+      gv += brightness_lanes(m[tri(1, 2)], m[tri(1, 3)], F{});
+      b += brightness_lanes(r.gram_r[2], r.gram_r[3], F{});
+    }
+    store_lane(F(load_lane<F>(&sums->b[c]) + b), &sums->b[c]);
+    for (std::size_t i = 0; i < std::min<std::size_t>(6, c + lanes_of<F>); ++i) {
+      float* row = &sums->H[i][c];
+      store_lane(F(load_lane<F>(row) + (r.du[i] * gu + r.dv[i] * gv)), row);
+    }
   }
-  sums->H[6][1] += Lane{0.0F, 0.0F, m[tri(2, 2)], m[tri(2, 3)]};
-  sums->H[7][1] += Lane{0.0F, 0.0F, 0.0F, m[tri(3, 3)]};
-  sums->b[0] += r.gram_r[0] * du[0] + r.gram_r[1] * dv[0];
-  sums->b[1] += r.gram_r[0] * du[1] + r.gram_r[1] * dv[1] + brightness_r;
+  sums->H[6][6] += m[tri(2, 2)];
+  sums->H[6][7] += m[tri(2, 3)];
+  sums->H[7][7] += m[tri(3, 3)];
 }
 
 /// H += u v^T.
-void add_outer_product(const std::array<float, 8>& u, const std::array<float, 8>& v,
-                       LaneBlock* sums) {
-  const Lane low = load_lane(&v[0]);
-  const Lane high = load_lane(&v[4]);
-  for (std::size_t i = 0; i < 8; ++i) {
-    sums->H[i][0] += u[i] * low;
-    sums->H[i][1] += u[i] * high;
+template <class F>
+SOVO_LANE_FUNCTION void add_outer_product(const float* u, const float* v, LaneBlock* sums) {
+  for (std::size_t c = 0; c < 8; c += lanes_of<F>) {
+    const F lanes = load_lane<F>(v + c);
+    for (std::size_t i = 0; i < 8; ++i) {
+      float* row = &sums->H[i][c];
+      store_lane(F(load_lane<F>(row) + u[i] * lanes), row);
+    }
   }
 }
+
+/// The residuals of a point: those that are inliers, their targets ascending.
+struct PointResiduals {
+  const TargetResidual* begin;
+  const TargetResidual* end;
+  bool has_depth;
+  float inverse_hessian, gradient;  ///< Of the point's depth.
+};
+
+/// Adds a point's residuals to the sums by target and by pair of targets. Returns how many counted.
+struct AddPoint {
+  template <class F>
+  SOVO_LANE_FUNCTION static int run(const PointResiduals& point, LaneBlock* top, LaneBlock* schur) {
+    int count = 0;
+    for (const TargetResidual* i = point.begin; i != point.end; ++i) {
+      const LinearizedResidual& r = i->linearized;
+      if (r.state != ResidualState::kIn) continue;
+      ++count;
+      add_relative<F>(r, &top[i->target]);
+      if (!point.has_depth) continue;
+      alignas(32) float scaled[8];
+      LaneBlock& own = schur[block_of(i->target, i->target)];
+      for (std::size_t c = 0; c < 8; c += lanes_of<F>) {
+        const F lanes = point.inverse_hessian * load_lane<F>(&r.cross[c]);
+        store_lane(lanes, scaled + c);
+        store_lane(F(load_lane<F>(&own.b[c]) + point.gradient * lanes), &own.b[c]);
+      }
+      for (const TargetResidual* j = point.begin; j <= i; ++j) {
+        if (j->linearized.state != ResidualState::kIn) continue;
+        // The earlier target is the row.
+        add_outer_product<F>(j->linearized.cross.data(), scaled,
+                             &schur[block_of(j->target, i->target)]);
+      }
+    }
+    return count;
+  }
+};
 
 /// The same sums in double precision.
 struct DoubleBlock {
@@ -49,9 +103,9 @@ struct DoubleBlock {
     for (std::size_t i = 0; i < 8; ++i) {
       for (std::size_t j = 0; j < 8; ++j) {
         H(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j)) +=
-            static_cast<double>(block.H[i][j / kLanes][j % kLanes]);
+            static_cast<double>(block.H[i][j]);
       }
-      b[static_cast<Eigen::Index>(i)] += static_cast<double>(block.b[i / kLanes][i % kLanes]);
+      b[static_cast<Eigen::Index>(i)] += static_cast<double>(block.b[i]);
     }
   }
 };
@@ -121,27 +175,13 @@ void HostSums::clear(int num_keyframes) {
 
 void HostSums::add(std::span<const TargetResidual> residuals, double hessian, double gradient) {
   const bool has_depth = hessian > kMinDepthHessian;
-  const float inverse = has_depth ? static_cast<float>(1.0 / hessian) : 0.0F;
-  const auto scaled_gradient = static_cast<float>(gradient);
-  for (std::size_t i = 0; i < residuals.size(); ++i) {
-    const LinearizedResidual& r = residuals[i].linearized;
-    if (r.state != ResidualState::kIn) continue;
-    ++residuals_;
-    add_relative(r, &top_[static_cast<std::size_t>(residuals[i].target)]);
-    if (!has_depth) continue;
-    alignas(16) std::array<float, 8> scaled;
-    for (std::size_t k = 0; k < 8; ++k) scaled[k] = inverse * r.cross[k];
-    for (std::size_t j = 0; j <= i; ++j) {
-      const LinearizedResidual& other = residuals[j].linearized;
-      if (other.state != ResidualState::kIn) continue;
-      // Targets ascend: the earlier one is the row.
-      add_outer_product(other.cross, scaled,
-                        &schur_[index(residuals[j].target, residuals[i].target)]);
-    }
-    LaneBlock& own = schur_[index(residuals[i].target, residuals[i].target)];
-    own.b[0] += scaled_gradient * load_lane(&scaled[0]);
-    own.b[1] += scaled_gradient * load_lane(&scaled[4]);
-  }
+  const PointResiduals point = {
+      .begin = residuals.data(),
+      .end = residuals.data() + residuals.size(),
+      .has_depth = has_depth,
+      .inverse_hessian = has_depth ? static_cast<float>(1.0 / hessian) : 0.0F,
+      .gradient = static_cast<float>(gradient)};
+  residuals_ += run_kernel<AddPoint>(point, top_.data(), schur_.data());
 }
 
 void add_host(const Window& window, int host, std::span<const HostSums> runs,

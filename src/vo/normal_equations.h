@@ -3,7 +3,6 @@
 #include <array>
 #include <span>
 
-#include "sovo/image/lanes.h"
 #include "sovo/vo/linearization.h"
 #include "sovo/vo/window.h"
 
@@ -25,11 +24,17 @@ struct NormalEquations {
 /// Points whose own H_rho_rho is less have no depth to eliminate, and none to step.
 inline constexpr double kMinDepthHessian = 1e-10;
 
-/// An 8x8 block and an 8-vector in single precision: two lanes a row.
-struct LaneBlock {
-  std::array<std::array<Lane, 2>, 8> H;
-  std::array<Lane, 2> b;
+/// An 8x8 block and an 8-vector in single precision. Of a symmetric block the part below the
+/// diagonal means nothing.
+struct alignas(32) LaneBlock {
+  float H[8][8];
+  float b[8];
 };
+
+/// Number of the block of two keyframes, a <= b, among those of all pairs.
+constexpr std::size_t block_of(int a, int b) {
+  return static_cast<std::size_t>(b * (b + 1) / 2 + a);
+}
 
 /// A residual of the point being added, into the keyframe with index `target`.
 struct TargetResidual {
@@ -50,13 +55,11 @@ class HostSums {
   /// J^T J (upper triangle) and J^T r of the residuals into a keyframe.
   const LaneBlock& top(int target) const { return top_[static_cast<std::size_t>(target)]; }
   /// H_xp H_pp^-1 H_xp^T between two targets, a <= b; of a == b also H_xp H_pp^-1 b_p.
-  const LaneBlock& schur(int a, int b) const { return schur_[index(a, b)]; }
+  const LaneBlock& schur(int a, int b) const { return schur_[block_of(a, b)]; }
   int residuals() const { return residuals_; }
   int num_keyframes() const { return num_keyframes_; }
 
  private:
-  static std::size_t index(int a, int b) { return static_cast<std::size_t>(b * (b + 1) / 2 + a); }
-
   int num_keyframes_ = 0;
   int residuals_ = 0;
   std::array<LaneBlock, kMaxSlots> top_;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "sovo/image/lanes.h"
+
 namespace sovo {
 namespace {
 
@@ -55,6 +57,41 @@ float median_gradient(const ImageF& image, int x0, int x1, int y0, int y1) {
 int region_begin(int region, int num_regions, int size) { return region * size / num_regions; }
 
 int ceil_div(int a, int b) { return (a + b - 1) / b; }
+
+/// A row of an image with those around it, and what its pixels are judged by, a column each.
+struct ScoreInput {
+  const float *row, *above, *below;
+  const float *nx, *ny;    ///< Direction of the block.
+  const float* threshold;  ///< Of the squared gradient.
+  const float* allowed;    ///< 1 or 0.
+};
+
+/// Raises `best` to |grad I * n| of the row's pixels, and sets `best_y` where that is more. Eight
+/// pixels at least.
+struct ScoreRow {
+  template <class F>
+  SOVO_LANE_FUNCTION static void score(const ScoreInput& in, int y, int x, float* best,
+                                       std::int32_t* best_y) {
+    const F gx = 0.5F * (load_lane<F>(in.row + x + 1) - load_lane<F>(in.row + x - 1));
+    const F gy = 0.5F * (load_lane<F>(in.below + x) - load_lane<F>(in.above + x));
+    const F along = abs_lane(F(gx * load_lane<F>(in.nx + x) + gy * load_lane<F>(in.ny + x)));
+    const MaskOf<F> strong = gx * gx + gy * gy > load_lane<F>(in.threshold + x);
+    const F value = F(strong ? along : F{}) * load_lane<F>(in.allowed + x);
+    const F before = load_lane<F>(best + x);
+    const MaskOf<F> better = value > before;
+    store_lane(F(better ? value : before), best + x);
+    const auto y_before = load_mask<MaskOf<F>>(best_y + x);
+    store_mask(MaskOf<F>(better ? y - MaskOf<F>{} : y_before), best_y + x);
+  }
+  template <class F>
+  SOVO_LANE_FUNCTION static void run(const ScoreInput& in, int y, int first, int last, float* best,
+                                     std::int32_t* best_y) {
+    constexpr int n = static_cast<int>(lanes_of<F>);
+    for (int x = first; x + n <= last; x += n) score<F>(in, y, x, best, best_y);
+    // The last ones with some before them once more: that changes nothing.
+    score<F>(in, y, last - n, best, best_y);
+  }
+};
 
 }  // namespace
 
@@ -190,6 +227,7 @@ void PixelSelector::select_level(const ImagePyramid& pyramid, int level,
   const int w = image.width();
   const int h = image.height();
   const int border = std::max(1, ceil_div(config_.border, 1 << level));
+  if (w - 2 * border < static_cast<int>(kWideLanes)) return;
   inherit_hits(level, w, h);
   int region_row = -1;
   for (int by = 0; by < blocks_y_[l]; ++by) {
@@ -230,7 +268,7 @@ void PixelSelector::fill_directions(int width) {
   direction_y_.resize(size);
   best_score_.assign(size, 0.0F);
   best_y_.assign(size, 0);
-  score_row_.resize(size);
+  allowed_row_.resize(size, 1.0F);
   for (int x0 = 0; x0 < width; x0 += block_) {
     const std::size_t k = random() % kNumDirections;
     const int x1 = std::min(width, x0 + block_);
@@ -257,29 +295,20 @@ void PixelSelector::fill_thresholds(int level, int region_row, int width, int fu
 
 /// Updates each column's best |grad I * n| among pixels above the threshold.
 void PixelSelector::score_row(const ImageF& image, int level, int y, int first_x, int last_x) {
-  const float* row = image.row(y);
-  const float* above = row - image.width();
-  const float* below = row + image.width();
-  const float* nx = direction_x_.data();
-  const float* ny = direction_y_.data();
-  const float* threshold = threshold_row_.data();
-  float* score = score_row_.data();
-  for (int x = first_x; x < last_x; ++x) {
-    const float gx = 0.5F * (row[x + 1] - row[x - 1]);
-    const float gy = 0.5F * (below[x] - above[x]);
-    const float along = std::abs(gx * nx[x] + gy * ny[x]);
-    score[x] = gx * gx + gy * gy > threshold[x] ? along : 0.0F;
-  }
   if (masked_) {
     const std::uint8_t* allowed = allowed_.row(y << level);
-    for (int x = first_x; x < last_x; ++x) score[x] *= allowed[x << level] != 0 ? 1.0F : 0.0F;
+    for (int x = first_x; x < last_x; ++x) {
+      allowed_row_[static_cast<std::size_t>(x)] = allowed[x << level] != 0 ? 1.0F : 0.0F;
+    }
   }
-  float* best = best_score_.data();
-  std::int32_t* best_y = best_y_.data();
-  for (int x = first_x; x < last_x; ++x) {
-    best_y[x] = score[x] > best[x] ? y : best_y[x];
-    best[x] = std::max(best[x], score[x]);
-  }
+  const ScoreInput in = {.row = image.row(y),
+                         .above = image.row(y - 1),
+                         .below = image.row(y + 1),
+                         .nx = direction_x_.data(),
+                         .ny = direction_y_.data(),
+                         .threshold = threshold_row_.data(),
+                         .allowed = allowed_row_.data()};
+  run_kernel<ScoreRow>(in, y, first_x, last_x, best_score_.data(), best_y_.data());
 }
 
 /// Among the level-0 pixels that pixel (x, y) of `level` covers, the one of the largest gradient

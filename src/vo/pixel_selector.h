@@ -87,7 +87,8 @@ class PixelSelector {
   std::array<std::vector<std::uint8_t>, 3> hit_;  // per block of a level: it or a finer one hit
   std::array<int, 3> blocks_x_{}, blocks_y_{};
   AlignedVector<float> direction_x_, direction_y_, threshold_row_;  // per column of a level
-  AlignedVector<float> score_row_, best_score_;  // per column, the best over a row of blocks
+  AlignedVector<float> allowed_row_;                                // per column, 1 or 0
+  AlignedVector<float> best_score_;  // per column, the best over a row of blocks
   AlignedVector<std::int32_t> best_y_;
   ImageU8 allowed_, erosion_rows_;
   bool masked_ = false;

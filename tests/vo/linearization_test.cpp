@@ -121,9 +121,9 @@ class WindowJacobian : public ::testing::Test {
       const auto row = static_cast<Eigen::Index>(i);
       for (std::size_t j = i; j < 8; ++j) {
         const auto column = static_cast<Eigen::Index>(j);
-        (*H)(row, column) = (*H)(column, row) = sums.top(1).H[i][j / kLanes][j % kLanes];
+        (*H)(row, column) = (*H)(column, row) = sums.top(1).H[i][j];
       }
-      (*b)[row] = sums.top(1).b[i / kLanes][i % kLanes];
+      (*b)[row] = sums.top(1).b[i];
       (*H)(row, 8) = (*H)(8, row) = linearized_.cross[i];
     }
     (*H)(8, 8) = hessian;

@@ -4,6 +4,8 @@
 
 #include "sovo/vo/coarse_tracker.h"
 #include "sovo/vo/normal_equations.h"
+#include "sovo/vo/pattern_kernels.h"
+#include "sovo/vo/tracking_kernels.h"
 #include "vo/window_test_support.h"
 
 namespace sovo {
@@ -39,12 +41,11 @@ Window noise_window() {
   return window;
 }
 
-void add_block(const LaneBlock& block, Checksum* sum) {
-  for (std::size_t half = 0; half < 2; ++half) {
-    for (std::size_t k = 0; k < kLanes; ++k) {
-      for (std::size_t i = 0; i < 8; ++i) sum->add(float{block.H[i][half][k]});
-      sum->add(float{block.b[half][k]});
-    }
+/// Of a symmetric block the upper part.
+void add_block(const LaneBlock& block, bool symmetric, Checksum* sum) {
+  for (std::size_t i = 0; i < 8; ++i) {
+    for (std::size_t j = symmetric ? i : 0; j < 8; ++j) sum->add(block.H[i][j]);
+    sum->add(block.b[i]);
   }
 }
 
@@ -75,17 +76,15 @@ TEST(SameBits, LinearizationAndItsSums) {
   EXPECT_EQ(residual_sum.value(), 0x7229fc204783c65aU);
   Checksum block_sum;
   for (int b = 1; b < window.size(); ++b) {
-    add_block(sums.top(b), &block_sum);
-    for (int a = 1; a <= b; ++a) add_block(sums.schur(a, b), &block_sum);
+    add_block(sums.top(b), true, &block_sum);
+    for (int a = 1; a <= b; ++a) add_block(sums.schur(a, b), a == b, &block_sum);
   }
-  EXPECT_EQ(block_sum.value(), 0x9659306ab1450116U);
+  EXPECT_EQ(block_sum.value(), 0x23ce2c189c8852b1U);
 }
 
-TEST(SameBits, TrackersNormalEquations) {
-  const ImageF image = noise_view(4);
-  TrackingReference reference;
-  reference.levels.resize(1);
-  ReferenceLevel& level = reference.levels[0];
+/// Pixels of an image as reference points, some of which a motion moves out of view.
+ReferenceLevel noise_level(const ImageF& image) {
+  ReferenceLevel level;
   level.camera = small_camera();
   std::mt19937 random(4);
   for (int i = 0; i < 1003; ++i) {
@@ -96,6 +95,13 @@ TEST(SameBits, TrackersNormalEquations) {
     level.rho.push_back(static_cast<float>(random() % 1000U) / 1000.0F);
     level.colour.push_back(image.at(u, v));
   }
+  return level;
+}
+
+TEST(SameBits, TrackersNormalEquations) {
+  const ImageF image = noise_view(4);
+  TrackingReference reference;
+  reference.levels = {noise_level(image)};
   CoarseTracker tracker({});
   const auto found = tracker.linearize(reference, 0, image, plain_pose(1), {1.01, -2.0}, 20.0);
   EXPECT_GT(found.inliers, 300);
@@ -106,7 +112,83 @@ TEST(SameBits, TrackersNormalEquations) {
     sum.add(found.b[i]);
   }
   sum.add(found.energy);
-  EXPECT_EQ(sum.value(), 0xf1a050d9d93b5fd0U);
+  EXPECT_EQ(sum.value(), 0x1f9797d0ab3a315dU);
+}
+
+/// Everything that the tracker's kernels give, in lanes of one kind.
+template <class Residuals, class Gram>
+Checksum tracked(const ImageF& image, const Residuals& residuals, const Gram& gram) {
+  const ReferenceLevel level = noise_level(image);
+  WarpedPoints warped;
+  warped.reserve(level.size() + kTrackedGroup);
+  ResidualSums sums;
+  residuals(TrackedPoints{level, image, Warp(level.camera, plain_pose(1))},
+            ResidualConfig{1.01F, -2.0F, 9.0F, 20.0F}, warped.arrays(), &sums);
+  std::array<double, kGram> total{};
+  gram(warped.arrays(), sums.n, BrightnessJacobian{1.01F, 0.5F}, total.data());
+  Checksum sum;
+  sum.add(sums.energy);
+  sum.add(sums.in_view);
+  sum.add(sums.inliers);
+  sum.add(std::span(total));
+  for (const auto* v : {&warped.x, &warped.gx, &warped.residual, &warped.weight}) {
+    sum.add(std::span(v->data(), sums.n));
+  }
+  return sum;
+}
+
+TEST(SameBits, TrackerInFourAndInEightLanes) {
+  if (!has_wide_lanes()) GTEST_SKIP() << "this processor has no registers of eight lanes";
+  const ImageF image = noise_view(4);
+  const auto four = tracked(
+      image, [](const auto&... args) { run_narrow<ResidualPass>(args...); },
+      [](const auto&... args) { run_narrow<GramOfInliers>(args...); });
+  const auto eight = tracked(
+      image, [](const auto&... args) { run_wide<ResidualPass>(args...); },
+      [](const auto&... args) { run_wide<GramOfInliers>(args...); });
+  EXPECT_EQ(four.value(), eight.value());
+}
+
+TEST(SameBits, PatternsInFourAndInEightLanes) {
+  if (!has_wide_lanes()) GTEST_SKIP() << "this processor has no registers of eight lanes";
+  const ImageF image = noise_view(4);
+  std::mt19937 random(9);
+  const auto draw = [&](int from, int to) {
+    return static_cast<float>(from) +
+           static_cast<float>(random() % static_cast<unsigned>(64 * (to - from))) / 64.0F;
+  };
+  int in_view = 0;
+  for (int trial = 0; trial < 300; ++trial) {
+    const PatternWarp warp = {{draw(-4, image.width() + 4), draw(-4, image.height() + 4), 1.0F},
+                              {1.02F, 0.03F, draw(-1, 1) / 64.0F},
+                              {-0.05F, 0.97F, 0.001F},
+                              image.width(),
+                              image.height()};
+    alignas(32) std::array<float, 2 * kPatternSize> fx{};
+    auto fy = fx;
+    std::array<std::int32_t, 2 * kPatternSize> offset{};
+    const bool inside = run_narrow<PlacePattern>(warp, &fx[0], &fy[0], &offset[0]);
+    EXPECT_EQ(run_wide<PlacePattern>(warp, &fx[8], &fy[8], &offset[8]), inside);
+    for (std::size_t i = 0; i < kPatternSize; ++i) {
+      EXPECT_EQ(fx[i], fx[i + 8]);
+      EXPECT_EQ(fy[i], fy[i + 8]);
+      EXPECT_EQ(offset[i], offset[i + 8]);
+    }
+    if (!inside) continue;
+    ++in_view;
+    std::array<float, kPatternSize> colour{};
+    std::array<float, kPatternSize> weight{};
+    for (float& value : colour) value = draw(0, 255);
+    for (float& value : weight) value = draw(0, 1);
+    const PatternInput in = {&image, &offset[0], &fx[0], &fy[0], &colour[0], &weight[0],
+                             1.01F,  -2.0F,      1.02F,  3.0F,   9.0F,       2500.0F};
+    alignas(32) std::array<float, 16> four{};
+    auto eight = four;
+    run_narrow<SumPattern>(in, four.data());
+    run_wide<SumPattern>(in, eight.data());
+    EXPECT_EQ(four, eight);
+  }
+  EXPECT_GT(in_view, 200);
 }
 
 TEST(SameBits, EpipolarSearch) {

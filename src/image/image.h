@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <limits>
 #include <new>
+#include <utility>
 #include <vector>
 
 namespace sovo {
@@ -29,15 +30,39 @@ struct AlignedAllocator {
 template <class T>
 using AlignedVector = std::vector<T, AlignedAllocator<T>>;
 
+/// The same; what a vector gains by `resize` is not set to zero: an image of a megabyte is written
+/// twice otherwise.
+template <class T>
+struct ImageAllocator : AlignedAllocator<T> {
+  ImageAllocator() = default;
+  template <class U>
+  explicit ImageAllocator(const ImageAllocator<U>& other) : AlignedAllocator<T>(other) {}
+
+  template <class U>
+  struct rebind {  // NOLINT(readability-identifier-naming): the standard's name
+    using other = ImageAllocator<U>;
+  };
+  template <class U>
+  void construct(U* p) {
+    ::new (static_cast<void*>(p)) U;
+  }
+  template <class U, class... Args>
+  void construct(U* p, Args&&... args) {
+    ::new (static_cast<void*>(p)) U(std::forward<Args>(args)...);
+  }
+};
+
 /// A single-channel image, rows tightly packed, row-major; `at(x, y)` with x to the right and y
 /// down. Values of a float image are grey levels in [0, 255].
 template <class T>
 class Image {
  public:
   Image() = default;
-  Image(int width, int height) : width_(width), height_(height) {
-    data_.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-  }
+  /// All zero.
+  Image(int width, int height)
+      : width_(width),
+        height_(height),
+        data_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), T{}) {}
 
   int width() const { return width_; }
   int height() const { return height_; }
@@ -62,7 +87,7 @@ class Image {
  private:
   int width_ = 0;
   int height_ = 0;
-  AlignedVector<T> data_;
+  std::vector<T, ImageAllocator<T>> data_;
 };
 
 using ImageF = Image<float>;

@@ -6,19 +6,12 @@
 #include <limits>
 
 #include "sovo/geometry/linear_solvers.h"
-#include "sovo/image/lanes.h"
+#include "sovo/image/patch_kernels.h"
 
 namespace sovo {
 
 namespace {
 
-using Vec2f = Eigen::Vector2f;
-using Mat2f = Eigen::Matrix2f;
-
-constexpr int kHalfAlong = kPatchAlong / 2;
-constexpr int kHalfAcross = kPatchAcross / 2;
-constexpr int kNodeSteps = 8;      ///< Steps between exact projections; whole lanes.
-constexpr int kSegmentSteps = 24;  ///< Steps that share one warp of the base patch; whole lanes.
 constexpr double kMinSpeed = 1e-6;
 constexpr double kMaxShear = 0.6;       ///< Displacement along the curve a row across [px].
 constexpr double kShearPrior = 2500.0;  ///< Residuals of 5 grey levels against 0.1 px a row.
@@ -34,43 +27,6 @@ bool readable(const ImageF& image, const Vec2f& center, const Vec2f& a, const Ve
   return readable(image, center - reach) && readable(image, center + reach);
 }
 
-/// Steps along and across of each pixel of a grid; along is the slow index. Filled up to whole
-/// lanes with the centre.
-template <int kHalfS, int kHalfT>
-struct Grid {
-  static constexpr std::size_t kSize =
-      static_cast<std::size_t>((2 * kHalfS + 1) * (2 * kHalfT + 1));
-  static constexpr std::size_t kPadded = (kSize + kWideLanes - 1) / kWideLanes * kWideLanes;
-  alignas(32) std::array<float, kPadded> s{}, t{};
-  constexpr Grid() {
-    std::size_t k = 0;
-    for (int i = -kHalfS; i <= kHalfS; ++i) {
-      for (int j = -kHalfT; j <= kHalfT; ++j, ++k) {
-        s[k] = static_cast<float>(i);
-        t[k] = static_cast<float>(j);
-      }
-    }
-  }
-};
-
-/// Samples of a grid: center + i s + j t.
-template <int kHalfS, int kHalfT>
-struct SampleGrid {
-  template <class F>
-  SOVO_LANE_FUNCTION static void run(const ImageF& image, const Vec2f& center, const Vec2f& s,
-                                     const Vec2f& t, float* values) {
-    constexpr Grid<kHalfS, kHalfT> kGrid;
-    // Those that fill up the last lanes are not needed.
-    for (std::size_t k = 0; k < kGrid.kSize; k += lanes_of<F>) {
-      const F i = load_lane<F>(&kGrid.s[k]);
-      const F j = load_lane<F>(&kGrid.t[k]);
-      store_lane(sample_lanes(image, F(center.x() + i * s.x() + j * t.x()),
-                              F(center.y() + i * s.y() + j * t.y())),
-                 values + k);
-    }
-  }
-};
-
 /// Samples a grid around `center`, `axes` = (along, across) steps, and up to whole lanes more.
 /// False when it leaves the image.
 template <int kHalfS, int kHalfT>
@@ -82,9 +38,6 @@ bool sample_grid(const ImageF& image, const Vec2f& center, const Mat2f& axes,
   run_kernel<SampleGrid<kHalfS, kHalfT>>(image, center, s, t, out->data());
   return true;
 }
-
-/// The pixels of a patch, along is the slow index, and zeros behind them up to whole lanes.
-using Patch = std::array<float, Grid<kHalfAlong, kHalfAcross>::kPadded>;
 
 float sum_of(const WideLane& v) { return sum_lane(low_half(v) + high_half(v)); }
 
@@ -121,57 +74,6 @@ Mat2f axes_of(const Vec2& direction) {
   axes << e.x(), -e.y(), e.y(), e.x();
   return axes;
 }
-
-/// Target image along the curve: one column of kPatchAcross pixels a step, stored by rows, with
-/// whole lanes of unseen columns behind the last.
-struct Strip {
-  static constexpr int kColumns = CorrelationProfile::kCapacity + kPatchAlong - 1;
-  static constexpr std::size_t kStride = kColumns + 4 * kWideLanes;
-  int size = 0;
-  std::array<std::array<float, kStride>, kPatchAcross> rows;
-  std::array<float, kStride> sum, energy, rho;
-  std::array<std::int32_t, kStride> seen;  ///< -1 or 0.
-};
-static_assert(kNodeSteps % kWideLanes == 0 && kSegmentSteps % kWideLanes == 0);
-
-/// Columns from a pixel on, in steps.
-struct ColumnRun {
-  Vec2f from, step, across;
-};
-
-/// Writes `count` columns from column k on, and up to whole lanes more.
-struct SampleColumns {
-  template <class F>
-  SOVO_LANE_FUNCTION static void run(const ImageF& image, const ColumnRun& columns, int count,
-                                     std::size_t k, Strip* strip) {
-    const Vec2f reach = kHalfAcross * columns.across.cwiseAbs();
-    const F zero = lane_of<F>(0.0F);
-    for (int begin = 0; begin < count; begin += static_cast<int>(lanes_of<F>)) {
-      const F index = lane_index<F>() + static_cast<float>(begin);
-      const F x = columns.from.x() + index * columns.step.x();
-      const F y = columns.from.y() + index * columns.step.y();
-      const MaskOf<F> seen = (x >= reach.x()) & (y >= reach.y()) &
-                             (x < static_cast<float>(image.width() - 1) - reach.x()) &
-                             (y < static_cast<float>(image.height() - 1) - reach.y());
-      F sum = zero;
-      F energy = zero;
-      for (int j = 0; j < kPatchAcross; ++j) {
-        const auto offset = static_cast<float>(j - kHalfAcross);
-        // A pixel that can be read, where the column is not seen.
-        const F u = x + offset * columns.across.x();
-        const F v = y + offset * columns.across.y();
-        const F value = sample_lanes(image, F(seen ? u : zero), F(seen ? v : zero));
-        store_lane(value, &strip->rows[static_cast<std::size_t>(j)][k]);
-        sum += value;
-        energy += value * value;
-      }
-      store_lane(sum, &strip->sum[k]);
-      store_lane(energy, &strip->energy[k]);
-      store_mask(seen, &strip->seen[k]);
-      k += lanes_of<F>;
-    }
-  }
-};
 
 /// Columns that are read with the last ones, but are none.
 void pad(Strip* strip) {
@@ -254,36 +156,6 @@ class BasePatch {
   bool seen_ = false, fits_ = false;
   Mat2f axes_ = Mat2f::Zero();
   alignas(32) Patch patch_{};
-};
-
-/// Correlation of the patch with the windows that begin at the columns from `begin` to `end`, and
-/// up to whole lanes more.
-struct WindowScores {
-  template <class F>
-  SOVO_LANE_FUNCTION static void run(const Strip& strip, const Patch& patch, int begin, int end,
-                                     float* score) {
-    for (int at = begin; at < end; at += static_cast<int>(lanes_of<F>)) {
-      const auto first = static_cast<std::size_t>(at);
-      F sum{};
-      F energy{};
-      MaskOf<F> seen = ~MaskOf<F>{};
-      F products[kPatchAcross] = {};
-      for (std::size_t i = 0; i < kPatchAlong; ++i) {
-        sum += load_lane<F>(&strip.sum[first + i]);
-        energy += load_lane<F>(&strip.energy[first + i]);
-        seen &= load_mask<MaskOf<F>>(&strip.seen[first + i]);
-        for (std::size_t j = 0; j < kPatchAcross; ++j) {
-          products[j] += patch[i * kPatchAcross + j] * load_lane<F>(&strip.rows[j][first + i]);
-        }
-      }
-      F product = products[0];
-      for (std::size_t j = 1; j < kPatchAcross; ++j) product += products[j];
-      const F variance = energy - sum * sum / static_cast<float>(kPatchSize);
-      const F zero = lane_of<F>(0.0F);
-      const F visible = variance < 1e-2F * kPatchSize ? zero : F(product / sqrt_lane(variance));
-      store_lane(F(seen ? visible : lane_of<F>(CorrelationProfile::kUnseen)), score + first);
-    }
-  }
 };
 
 }  // namespace

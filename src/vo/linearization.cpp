@@ -59,7 +59,9 @@ void sum_pattern(const ImageF& image, const PairGeometry& g, const Point& point,
 void fill_cross(LinearizedResidual* r) {
   const float gu = r->gram[tri(0, 0)] * r->du_rho + r->gram[tri(0, 1)] * r->dv_rho;
   const float gv = r->gram[tri(0, 1)] * r->du_rho + r->gram[tri(1, 1)] * r->dv_rho;
-  for (std::size_t k = 0; k < 6; ++k) r->cross[k] = r->du[k] * gu + r->dv[k] * gv;
+  for (std::size_t k = 0; k < 8; k += kLanes) {
+    store_lane(Lane(gu * load_lane(&r->du[k]) + gv * load_lane(&r->dv[k])), &r->cross[k]);
+  }
   r->cross[6] = r->gram[tri(0, 2)] * r->du_rho + r->gram[tri(1, 2)] * r->dv_rho;
   r->cross[7] = r->gram[tri(0, 3)] * r->du_rho + r->gram[tri(1, 3)] * r->dv_rho;
 }

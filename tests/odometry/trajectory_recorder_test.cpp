@@ -112,6 +112,28 @@ TEST(RefinedKeyframePoses, StepsTurnWithTheKeyframeBefore) {
   EXPECT_LT((poses[1].translation() - Vec3(1, 3, 3)).norm(), 1e-12);
 }
 
+TEST(RefinedKeyframePoses, RotationsAreThoseOfTheWindow) {
+  std::vector<KeyframePose> keyframes = {keyframe(0, at(0)), keyframe(1, at(1))};
+  keyframes[1].T_world_camera = SE3(SO3::exp(Vec3(0.1, -0.2, 0.3)), Vec3(7, 7, 7));
+  const auto poses = refined_keyframe_poses(keyframes);
+  EXPECT_LT(poses[0].rotation().log().norm(), 1e-12);
+  EXPECT_LT((poses[1].rotation().log() - Vec3(0.1, -0.2, 0.3)).norm(), 1e-12);
+}
+
+TEST(RefinedKeyframePoses, ThoseThatHaveNotChangedAreKept) {
+  std::vector<KeyframePose> keyframes = {keyframe(0, at(0)), keyframe(1, at(1))};
+  std::vector<SE3> poses;
+  refine_keyframe_poses(keyframes, 0, &poses);
+  keyframes[0].step = Vec3(50, 0, 0);
+  keyframes[1].step = Vec3(2, 0, 0);
+  keyframes.push_back(keyframe(2, at(1)));
+  refine_keyframe_poses(keyframes, 1, &poses);
+  ASSERT_EQ(poses.size(), 3U);
+  EXPECT_EQ(poses[0].translation().x(), 0.0);
+  EXPECT_EQ(poses[1].translation().x(), 2.0);
+  EXPECT_EQ(poses[2].translation().x(), 3.0);
+}
+
 TEST(RefinedKeyframePoses, OfNoneAreNone) { EXPECT_TRUE(refined_keyframe_poses({}).empty()); }
 
 TrackedFrame tracked(std::int64_t stamp_ns, std::uint32_t keyframe_id, const SE3& T_frame_keyframe,

@@ -78,7 +78,7 @@ LEFT=$EYE LEFT_DEVICE=$DEVICE
 plug_in_eye 2 right
 RIGHT=$EYE
 begin two_cameras
-"$BIN/pair_check" /tmp/eyes.yaml 60 "${EYES[@]}" steady=$((5 * SECONDS_EACH))
+"$BIN/pair_check" /tmp/eyes.yaml 60 "${EYES[@]}" steady=$((3 * SECONDS_EACH))
 "$BIN/pair_check" /tmp/eyes.yaml 60 "${EYES[@]}" "left=$LEFT_DEVICE" right=0000001
 
 begin two_cameras_stalled

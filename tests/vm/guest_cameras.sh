@@ -5,6 +5,8 @@ modprobe vhci_hcd
 modprobe uvcvideo
 calibration 672 376 /tmp/vga.yaml
 calibration 1280 720 /tmp/hd.yaml
+# What a check may take on a host that is busy with other things.
+PATIENCE=$((60 + 20 * SECONDS_EACH))
 # Programs come over a slow file system: read them before time matters.
 cat "$BIN"/{camera_check,pair_check,emulated_camera,loopback_writer} >/dev/null
 
@@ -12,6 +14,12 @@ plug_in() {
   "$BIN/emulated_camera" 0 zed &
   ZED=$!
   wait_for_device ZED
+}
+# made NODE: when it was made, as /proc/uptime counts.
+made() {
+  local now
+  now=$(cut -d" " -f1 /proc/uptime)
+  echo "$now $(date +%s.%N) $(stat -c %.Z "$1")" | awk '{ print $1 - ($2 - $3) }'
 }
 # unplug PROCESS
 unplug() {
@@ -35,7 +43,7 @@ plug_in
 begin zed_list
 "$BIN/sovo" camera list
 begin zed_stream
-"$BIN/camera_check" /tmp/vga.yaml $((30 * SECONDS_EACH)) $((60 * SECONDS_EACH)) \
+"$BIN/camera_check" /tmp/vga.yaml $((30 * SECONDS_EACH)) $PATIENCE \
   device=0012345 width=1344 height=376 frame_rate=30 "controls=exposure=42,gain=33"
 v4l2-ctl -d "$DEVICE" -C gain,exposure_time_absolute,auto_exposure
 begin zed_published
@@ -54,7 +62,7 @@ for n in $(seq "$REPEATS"); do
   # In another place than before: the device's number may change, the port stays.
   sleep 0.7
   plug_in
-  echo "NODE $n $(cut -d" " -f1 /proc/uptime)"
+  echo "NODE $n $(made "$DEVICE")"
   for _ in $(seq 100); do
     sleep 0.1
     [ "$(v4l2-ctl -d "$DEVICE" -C gain)" = "gain: 44" ] && break
@@ -78,11 +86,11 @@ LEFT=$EYE LEFT_DEVICE=$DEVICE
 plug_in_eye 2 right
 RIGHT=$EYE
 begin two_cameras
-"$BIN/pair_check" /tmp/eyes.yaml 60 "${EYES[@]}" steady=$((3 * SECONDS_EACH))
+"$BIN/pair_check" /tmp/eyes.yaml $PATIENCE "${EYES[@]}" pairs=$((3 * SECONDS_EACH))
 "$BIN/pair_check" /tmp/eyes.yaml 60 "${EYES[@]}" "left=$LEFT_DEVICE" right=0000001
 
 begin two_cameras_stalled
-start /tmp/stalled.txt pair_check /tmp/eyes.yaml 90 "${EYES[@]}" alone=4 dropped=4 steady=10
+start /tmp/stalled.txt pair_check /tmp/eyes.yaml 90 "${EYES[@]}" alone=4 dropped=4 pairs=10
 for stalled in "$RIGHT" "$LEFT"; do
   sleep 0.5
   kill -STOP "$stalled"
@@ -93,7 +101,7 @@ wait "$CHECK"
 cat /tmp/stalled.txt
 
 begin two_cameras_unplugged
-start /tmp/unplug.txt pair_check /tmp/eyes.yaml 90 "${EYES[@]}" reconnects=1 steady=10
+start /tmp/unplug.txt pair_check /tmp/eyes.yaml 90 "${EYES[@]}" reconnects=1 pairs=10
 unplug "$RIGHT"
 sleep 0.7
 plug_in_eye 3 right
@@ -110,10 +118,10 @@ unplug "$LEFT"
 
 begin loopback
 modprobe v4l2loopback devices=1 video_nr=20 card_label=Loop exclusive_caps=0 max_buffers=8
-"$BIN/loopback_writer" /dev/video20 2560 720 10 $((10 * SECONDS_EACH + 40)) &
+"$BIN/loopback_writer" /dev/video20 2560 720 10 $((10 * PATIENCE)) &  # until it is killed
 WRITER=$!
 sleep 0.5
-"$BIN/camera_check" /tmp/hd.yaml $((8 * SECONDS_EACH)) $((60 * SECONDS_EACH)) device=/dev/video20 \
+"$BIN/camera_check" /tmp/hd.yaml $((8 * SECONDS_EACH)) $PATIENCE device=/dev/video20 \
   width=2560 height=720 colour=true
 kill "$WRITER" 2>/dev/null
 wait "$WRITER" 2>/dev/null

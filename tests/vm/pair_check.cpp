@@ -5,19 +5,18 @@
 //     pair_check CALIBRATION SECONDS KEY=VALUE...
 //
 // KEY=VALUE are keys of V4l2Options and, with "live.", of LiveOptions. It goes on until all of
-// these have come, or the seconds are over: "steady=N" pairs with nothing alone between them, after
-// "alone=N" left images without a right one, "dropped=N" right images without a left one, and
-// "reconnects=N" of the right camera. "right_late_ms=T": the right camera exposes so much later,
-// and no pair is a right one.
+// these have come, or the seconds are over: "alone=N" left images without a right one, "dropped=N"
+// right images without a left one, "reconnects=N" of the right camera, and then "pairs=N".
+// "right_late_ms=T": the right camera exposes so much later, and no pair is a right one.
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdlib>
+#include <exception>
 #include <iostream>
 #include <optional>
 #include <string>
-#include <utility>
 
 #include "sovo/driver/live/host_clock.h"
 #include "sovo/driver/v4l2/v4l2_source.h"
@@ -30,20 +29,20 @@ namespace {
 struct PairOptions {
   v4l2::V4l2Options v4l2;
   LiveOptions live;
-  int steady = 0;
   int alone = 0;
   int dropped = 0;
   int reconnects = 0;
+  int pairs = 0;
   double right_late_ms = 0.0;
 
   template <class Visitor>
   void visit(Visitor& v) {
     v4l2.visit(v);
     v("live", live, "");
-    v("steady", steady, "");
     v("alone", alone, "");
     v("dropped", dropped, "");
     v("reconnects", reconnects, "");
+    v("pairs", pairs, "");
     v("right_late_ms", right_late_ms, "");
   }
 };
@@ -51,8 +50,8 @@ struct PairOptions {
 /// What came.
 struct Verdict {
   int frames = 0;
-  int alone = 0;       ///< Left images without a right one.
-  int steady = 0;      ///< Pairs since the last of them.
+  int alone = 0;  ///< Left images without a right one.
+  int pairs = 0;
   int torn = 0;        ///< Not one image's pixels, or not of this side.
   int mixed = 0;       ///< Left and right of different instants.
   int late = 0;        ///< The same, but one was stamped late: the emulated bus stood still.
@@ -75,11 +74,10 @@ class PairChecker {
     const auto left = number_of(frame.left, false);
     if (!frame.right.valid) {
       ++verdict_.alone;
-      verdict_.steady = 0;
       if (!left) ++verdict_.torn;
       return;
     }
-    ++verdict_.steady;
+    ++verdict_.pairs;
     const auto right = number_of(frame.right, true);
     if (!left || !right) {
       ++verdict_.torn;
@@ -122,10 +120,9 @@ void print(const char* name, const CameraCounts& c) {
 void print(const Verdict& v, const LiveReport& report) {
   const PairerCounts& pairs = report.pairs;
   std::cout << "RESULT {\"frames\":" << v.frames << ",\"alone\":" << v.alone
-            << ",\"steady\":" << v.steady << ",\"torn\":" << v.torn << ",\"mixed\":" << v.mixed
-            << ",\"late\":" << v.late << ",\"not_rising\":" << v.not_rising
-            << ",\"largest_error_ms\":" << v.largest_error_ms << ",\"pairs\":" << pairs.pairs
-            << ",\"unpaired_left\":" << pairs.unpaired_left
+            << ",\"torn\":" << v.torn << ",\"mixed\":" << v.mixed << ",\"late\":" << v.late
+            << ",\"not_rising\":" << v.not_rising << ",\"largest_error_ms\":" << v.largest_error_ms
+            << ",\"pairs\":" << pairs.pairs << ",\"unpaired_left\":" << pairs.unpaired_left
             << ",\"unpaired_right\":" << pairs.unpaired_right
             << ",\"out_of_order\":" << pairs.out_of_order
             << ",\"queue_dropped\":" << report.queue_dropped;
@@ -134,8 +131,9 @@ void print(const Verdict& v, const LiveReport& report) {
   std::cout << "}" << std::endl;
 }
 
-bool is_enough(const PairOptions& options, const Verdict& v, const LiveReport& report) {
-  return v.steady >= options.steady && v.alone >= options.alone &&
+/// Whether all has come that the pairs at the end are to follow.
+bool is_over(const PairOptions& options, const Verdict& v, const LiveReport& report) {
+  return v.alone >= options.alone &&
          report.pairs.unpaired_right >= static_cast<std::uint64_t>(options.dropped) &&
          report.cameras.at(1).counts.reconnects >= static_cast<std::uint64_t>(options.reconnects);
 }
@@ -149,15 +147,21 @@ int run(const PairOptions& options, const std::string& calibration, double secon
   for (const std::string& note : opened->notes) std::cout << "note: " << note << std::endl;
   PairChecker checker(options.v4l2.frame_rate, options.right_late_ms);
   const auto begin = std::chrono::steady_clock::now();
-  bool paired = false;
+  std::optional<int> pairs_before;  // all that was waited for had come
   while (std::chrono::steady_clock::now() - begin < std::chrono::duration<double>(seconds)) {
     const SourceResult next = opened->source->next(std::chrono::milliseconds(100));
-    if (next.state == SourceState::kFrame) checker.look(next.frame);
-    if (!std::exchange(paired, paired || checker.verdict().steady > 0) && paired) {
-      std::cout << "FIRST FRAME" << std::endl;
+    if (next.state != SourceState::kFrame) continue;
+    checker.look(next.frame);
+    const Verdict& verdict = checker.verdict();
+    if (next.frame.right.valid && verdict.pairs == 1) std::cout << "FIRST FRAME" << std::endl;
+    if (!pairs_before && is_over(options, verdict, opened->source->report())) {
+      pairs_before = verdict.pairs;
     }
-    if (is_enough(options, checker.verdict(), opened->source->report())) break;
+    if (pairs_before && verdict.pairs - *pairs_before >= options.pairs) break;
   }
+  std::cout << "PAIRS AT THE END "
+            << checker.verdict().pairs - pairs_before.value_or(checker.verdict().pairs)
+            << std::endl;
   print(checker.verdict(), opened->source->report());
   return 0;
 }
@@ -165,7 +169,7 @@ int run(const PairOptions& options, const std::string& calibration, double secon
 }  // namespace
 }  // namespace sovo::test
 
-int main(int argc, char** argv) {
+int main(int argc, char** argv) try {
   if (argc < 3) return 2;
   sovo::test::PairOptions options;
   for (int i = 3; i < argc; ++i) {
@@ -175,4 +179,7 @@ int main(int argc, char** argv) {
     }
   }
   return sovo::test::run(options, argv[1], std::atof(argv[2]));
+} catch (const std::exception& e) {
+  std::cerr << "pair_check: " << e.what() << std::endl;
+  return 1;
 }

@@ -145,7 +145,7 @@ void DirectOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
   }
   k.points_hosted = static_cast<int>(k.points.size());
   window_.update_geometry();
-  record_poses();
+  keyframes_.record(window_poses(), log_scale_);
   publish_reference();
 }
 
@@ -221,7 +221,7 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
   take_snapshot();
   result.left = marginalize(timer);
   add_immature_points(proposer, timer);
-  record_poses();
+  keyframes_.record(window_poses(), log_scale_);
   result.active_points = window_.num_active_points();
   result.keyframes = window_.size();
   return result;
@@ -229,7 +229,7 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
 
 std::vector<KeyframeState> DirectOdometry::marginalize(const MapTimer& timer) {
   const StageTimer t(timer, MapStage::kMarginalization);
-  record_poses();  // of those that leave now
+  keyframes_.record(window_poses(), log_scale_);  // of those that leave now
   const LeavingPoints leaving = mark_leaving_points(config_.window, &window_);
   const double rho_unit = window_.mean_inverse_depth();
   for (const PointRef& ref : leaving.marginalize) {
@@ -301,25 +301,13 @@ void DirectOdometry::add_immature_points(const DepthProposer& proposer, const Ma
   }
 }
 
-void DirectOdometry::record_poses() {
+std::vector<WindowPose> DirectOdometry::window_poses() const {
+  std::vector<WindowPose> poses;
   for (int i = 0; i < window_.size(); ++i) {
     const Keyframe& k = window_[i];
-    const bool is_new = keyframes_.size() <= k.id;
-    if (is_new) keyframes_.resize(k.id + std::size_t{1});
-    KeyframePose& record = keyframes_[k.id];
-    record.id = k.id;
-    if (is_new) record.log_scale = log_scale_;
-    record.stamp_ns = k.stamp_ns;
-    record.T_world_camera = k.T_world_camera();
-    const bool beside_its_previous = i > 0 && window_[i - 1].id + 1 == k.id;
-    if (k.id == 0) {
-      if (is_new) record.step = record.T_world_camera.translation();
-    } else if (is_new || beside_its_previous) {
-      const SE3& T_world_previous = keyframes_[k.id - std::size_t{1}].T_world_camera;
-      record.step =
-          (T_world_previous.inverse() * record.T_world_camera).translation() / record.later_scale;
-    }
+    poses.push_back({k.id, k.stamp_ns, k.T_world_camera()});
   }
+  return poses;
 }
 
 void DirectOdometry::publish_reference() {
@@ -376,30 +364,16 @@ double DirectOdometry::apply(const ScaleCorrection& correction) {
   window_.apply_similarity(scale);
   log_scale_ += log_scale;
   if (correction.first_lock) {
-    rescale_records(scale, centre);
+    keyframes_.rescale_all(window_poses(), scale, centre, log_scale_);
   } else {
-    for (int i = 0; i + 1 < window_.size(); ++i) {
-      keyframes_[window_[i].id].later_scale *= scale;
-    }
+    keyframes_.rescale(window_poses(), scale, log_scale_);
   }
   ++scale_epoch_;
   epoch_log_scale_.push_back(log_scale_);
-  keyframes_[window_.newest().id].log_scale = log_scale_;
-  record_poses();
   auto next = std::make_shared<TrackingReference>(rescaled(*reference(), scale));
   const std::lock_guard lock(reference_mutex_);
   reference_ = std::move(next);
   return log_scale;
-}
-
-void DirectOdometry::rescale_records(double scale, const Vec3& centre) {
-  for (KeyframePose& record : keyframes_) {
-    Vec3& position = record.T_world_camera.translation();
-    position = centre + scale * (position - centre);
-    record.step =
-        record.id == 0 ? Vec3(centre + scale * (record.step - centre)) : scale * record.step;
-    record.log_scale = log_scale_;
-  }
 }
 
 }  // namespace sovo

@@ -12,6 +12,7 @@
 #include "sovo/vo/bundle_adjustment.h"
 #include "sovo/vo/coarse_tracker.h"
 #include "sovo/vo/direct_config.h"
+#include "sovo/vo/keyframe_poses.h"
 #include "sovo/vo/monocular_odometry.h"
 #include "sovo/vo/pixel_selector.h"
 #include "sovo/vo/point_activation.h"
@@ -76,19 +77,6 @@ struct MapResult {
 enum class MapStage { kTracing, kSelection, kStaticMatching, kBundleAdjustment, kMarginalization };
 using MapTimer = std::function<void(MapStage, double seconds)>;
 
-/// A keyframe's pose as the window knows it, or as it was when it left.
-struct KeyframePose {
-  std::uint32_t id = 0;
-  std::int64_t stamp_ns = 0;
-  SE3 T_world_camera;
-  /// From the keyframe before it, in that one's axes, as when the two were last in the window
-  /// together; similarities later than this keyframe's own are undone. Of the first one: where the
-  /// map began.
-  Vec3 step = Vec3::Zero();
-  double later_scale = 1.0;  ///< Product of the similarities since this keyframe was the newest.
-  double log_scale = 0.0;    ///< Sum of all similarities applied up to its own.
-};
-
 /// Direct sparse odometry of one camera: tracking of every frame, a sliding window of keyframes,
 /// points and a marginalization prior. Its lengths are in whatever unit the map began with;
 /// `apply` rescales it.
@@ -131,7 +119,7 @@ class DirectOdometry {
   double log_scale() const { return log_scale_; }
 
   /// Poses of all keyframes of the map, by id.
-  const std::vector<KeyframePose>& keyframes() const { return keyframes_; }
+  const std::vector<KeyframePose>& keyframes() const { return keyframes_.poses(); }
 
   std::shared_ptr<const TrackingReference> reference() const;
 
@@ -144,8 +132,7 @@ class DirectOdometry {
   void keep_point(const Point& point, double rho_unit, KeyframePoints* points) const;
   KeyframeState state_without_active_points(const Keyframe& keyframe) const;
   void publish_reference();
-  void record_poses();
-  void rescale_records(double scale, const Vec3& centre);
+  std::vector<WindowPose> window_poses() const;
   void take_snapshot();
   TrackedFrame track_hypotheses(const MonoFrame& frame,
                                 std::shared_ptr<const TrackingReference> reference,
@@ -168,7 +155,7 @@ class DirectOdometry {
   double log_scale_ = 0.0;
   std::vector<double> epoch_log_scale_;  ///< log_scale_ at each epoch.
   std::optional<KeyframeSnapshot> snapshot_;
-  std::vector<KeyframePose> keyframes_;
+  KeyframePoses keyframes_;
   std::map<std::uint32_t, KeyframePoints> marginalized_;  ///< By the window's keyframes.
 
   // Shared: the reference.

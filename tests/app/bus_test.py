@@ -7,7 +7,8 @@ import signal
 import subprocess
 
 import harness
-from harness import DATASET, FAILED, OK, CommandTest, largest_error, read_tum, sovo, start
+from harness import (DATASET, FAILED, OK, CommandTest, largest_error, own_domain, read_tum, sovo,
+                     start)
 
 FRAMES = 40
 TRUTH = pathlib.Path(DATASET) / "groundtruth_cam0_tum.txt"
@@ -18,7 +19,7 @@ class BusTest(CommandTest):
 
     def setUp(self):
         super().setUp()
-        self.bus = ["--domain", 20 + os.getpid() % 80, "--ns", f"test{os.getpid()}"]
+        self.bus = ["--domain", own_domain(), "--ns", f"test{os.getpid()}"]
 
     def start(self, *arguments):
         process = start(*arguments, *self.bus)

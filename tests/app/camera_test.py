@@ -1,11 +1,10 @@
 """`sovo camera v4l2` and `aravis`, `sovo camera list` and `sovo doctor` where no camera is attached;
 real drivers are in tests/vm, simulated GigE Vision cameras in tests/driver/aravis."""
 
-import os
 import signal
 
 import harness
-from harness import BAD_INPUT, FAILED, OK, USAGE, CommandTest, sovo, start
+from harness import BAD_INPUT, FAILED, OK, USAGE, CommandTest, own_domain, sovo, start
 
 CALIBRATION = """sovo_calibration: 1
 left: {width: 672, height: 376, fx: 350, fy: 350, cx: 336, cy: 188, distortion: none}
@@ -48,7 +47,7 @@ class RealCameras(CommandTest):
         calibration.write_text(CALIBRATION)
         camera = start("camera", "v4l2", "--device", "not-there", "--control", "gain=1",
                        "--control", "exposure=2", "--calib", calibration,
-                       "--domain", 20 + os.getpid() % 80)
+                       "--domain", own_domain())
         self.addCleanup(camera.kill)
         self.wait_for_line(camera.stderr, "waiting for it")
         self.wait_for_line(camera.stderr, "camera: opening: no camera is 'not-there'")

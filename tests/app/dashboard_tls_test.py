@@ -12,7 +12,7 @@ import ssl
 import subprocess
 
 import harness
-from harness import FAILED, OK, USAGE, sovo, start
+from harness import FAILED, OK, USAGE, own_domain, sovo, start
 
 TOKEN = "0123456789abcdef0123456789abcdef"
 
@@ -26,7 +26,7 @@ class DashboardTls(harness.CommandTest):
         self.token = self.folder / "token"
         self.token.write_text(TOKEN + "\n")
         self.token.chmod(0o600)
-        self.bus = ["--network", "lo", "--domain", str(20 + os.getpid() % 80)]
+        self.bus = ["--network", "lo", "--domain", str(own_domain())]
 
     def make_certificate(self, name):
         certificate, key = self.folder / f"{name}.pem", self.folder / f"{name}.key"

@@ -1,7 +1,10 @@
 """What the tests of the command share: starting it, reading trajectories, comparing them."""
 
+import errno
+import functools
 import os
 import pathlib
+import socket
 import subprocess
 import sys
 import tempfile
@@ -28,6 +31,29 @@ def start(*arguments):
     """Starts the command; the caller ends it."""
     return subprocess.Popen([SOVO, *map(str, arguments)], stdout=subprocess.PIPE,
                             stderr=subprocess.PIPE, text=True)
+
+
+@functools.cache
+def hold_domain():
+    """A DDS domain, 1 to 100, and what holds it for this process as long as it lives.
+
+    It is a name in the abstract space of Unix sockets, which belongs to the network namespace as
+    the domain does; tests/bridge/own_domain.h takes the same names."""
+    holder = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
+    for i in range(100):
+        domain = 1 + (os.getpid() + i) % 100
+        try:
+            holder.bind(f"\0sovo_test_domain_{domain}")
+            return domain, holder
+        except OSError as error:
+            if error.errno != errno.EADDRINUSE:
+                raise
+    raise RuntimeError("all DDS domains for tests are taken")
+
+
+def own_domain():
+    """The DDS domain that no other test process on this network has."""
+    return hold_domain()[0]
 
 
 class CommandTest(unittest.TestCase):

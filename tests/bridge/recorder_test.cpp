@@ -75,12 +75,15 @@ TEST_F(RecorderTest, ObeysCommandsOnceAndTellsItsState) {
     bool recording = false;
     std::string reason;
   } last;
-  const auto ask = [&](std::uint64_t id, std::uint8_t what, const std::string& name) {
+  const auto send = [&](std::uint64_t id, std::uint8_t what, const std::string& name) {
     msg::RecorderCommand command{};
     command.id = id;
     command.command = what;
     command.name = borrow(name);
     EXPECT_TRUE(commands.write(command).ok());
+  };
+  const auto ask = [&](std::uint64_t id, std::uint8_t what, const std::string& name) {
+    send(id, what, name);
     return eventually([&] {
       recorder->poll();
       (void)states.take_each([&](const msg::RecorderStatus& m, const dds_sample_info_t&) {
@@ -97,7 +100,9 @@ TEST_F(RecorderTest, ObeysCommandsOnceAndTellsItsState) {
   ASSERT_TRUE(ask(3, Traits::STOP, ""));
   EXPECT_FALSE(last.recording);
   EXPECT_EQ(last.reason, "stopped by command");
+  send(1, Traits::START, "again");  // an id that was obeyed already
   ASSERT_TRUE(ask(4, Traits::START, "../elsewhere"));
+  EXPECT_FALSE(fs::exists(folder_ / "again"));
   EXPECT_FALSE(last.recording);
   EXPECT_NE(last.reason.find("refused"), std::string::npos);
   ASSERT_TRUE(ask(5, Traits::START, ""));

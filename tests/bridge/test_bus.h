@@ -1,19 +1,22 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <functional>
 #include <string>
 #include <thread>
 
+#include "own_domain.h"
 #include "sovo/bridge/participant.h"
 
 namespace sovo::bridge {
 
 /// A domain of this process's own, so that tests may run beside each other.
-inline int test_domain() { return 10 + static_cast<int>(::getpid() % 100); }
+inline int test_domain() {
+  static const OwnDomain domain;
+  return domain.number();
+}
 
 /// A participant on loopback, whatever the environment says.
 inline Participant open_participant(DdsConfig config = {}) {

@@ -18,53 +18,40 @@ KeyframePose keyframe(std::uint32_t id, const SE3& pose) {
   return k;
 }
 
-/// A window without images, in which the records are kept as DirectOdometry keeps them.
+/// A window without images.
 class CorrectedWindow {
  public:
   void add(const Vec3& position) {
-    keyframes_.push_back(
-        keyframe(static_cast<std::uint32_t>(keyframes_.size()), {SO3(), position}));
-    keyframes_.back().log_scale = log_scale_;
-    record();
+    const auto id = static_cast<std::uint32_t>(poses_.poses().size());
+    window_.push_back({id, 100 * (id + 1), SE3(SO3(), position)});
+    poses_.record(window_, log_scale_);
   }
   /// A measured similarity.
   void correct(double log_scale) {
-    drift(log_scale);
-    for (std::size_t i = oldest_; i + 1 < keyframes_.size(); ++i) {
-      keyframes_[i].later_scale *= std::exp(log_scale);
-    }
+    rescale(std::exp(log_scale));
     log_scale_ += log_scale;
-    keyframes_.back().log_scale = log_scale_;
-    record();
+    poses_.rescale(window_, std::exp(log_scale), log_scale_);
   }
   /// Bundle adjustment changes the scale of the window.
   void drift(double log_scale) {
-    const Vec3 centre = newest();
-    for (std::size_t i = oldest_; i < keyframes_.size(); ++i) {
-      Vec3& p = keyframes_[i].T_world_camera.translation();
-      p = centre + std::exp(log_scale) * (p - centre);
-    }
-    record();
+    rescale(std::exp(log_scale));
+    poses_.record(window_, log_scale_);
   }
-  void drop_oldest() { ++oldest_; }
-  const std::vector<KeyframePose>& keyframes() const { return keyframes_; }
-  Vec3 newest() const { return keyframes_.back().T_world_camera.translation(); }
+  void drop_oldest() { window_.erase(window_.begin()); }
+  const std::vector<KeyframePose>& keyframes() const { return poses_.poses(); }
+  Vec3 newest() const { return window_.back().T_world_camera.translation(); }
 
  private:
-  void record() {
-    for (std::size_t i = oldest_; i < keyframes_.size(); ++i) {
-      KeyframePose& k = keyframes_[i];
-      if (i > oldest_) {
-        k.step = (keyframes_[i - 1].T_world_camera.inverse() * k.T_world_camera).translation() /
-                 k.later_scale;
-      } else if (i == 0 && keyframes_.size() == 1) {
-        k.step = k.T_world_camera.translation();
-      }
+  void rescale(double scale) {
+    const Vec3 centre = newest();
+    for (WindowPose& k : window_) {
+      Vec3& p = k.T_world_camera.translation();
+      p = centre + scale * (p - centre);
     }
   }
 
-  std::vector<KeyframePose> keyframes_;
-  std::size_t oldest_ = 0;
+  KeyframePoses poses_;
+  std::vector<WindowPose> window_;
   double log_scale_ = 0.0;
 };
 
@@ -123,6 +110,28 @@ TEST(RefinedKeyframePoses, StepsTurnWithTheKeyframeBefore) {
   const auto poses = refined_keyframe_poses(keyframes);
   EXPECT_LT((poses[0].translation() - Vec3(1, 2, 3)).norm(), 1e-12);
   EXPECT_LT((poses[1].translation() - Vec3(1, 3, 3)).norm(), 1e-12);
+}
+
+TEST(RefinedKeyframePoses, RotationsAreThoseOfTheWindow) {
+  std::vector<KeyframePose> keyframes = {keyframe(0, at(0)), keyframe(1, at(1))};
+  keyframes[1].T_world_camera = SE3(SO3::exp(Vec3(0.1, -0.2, 0.3)), Vec3(7, 7, 7));
+  const auto poses = refined_keyframe_poses(keyframes);
+  EXPECT_LT(poses[0].rotation().log().norm(), 1e-12);
+  EXPECT_LT((poses[1].rotation().log() - Vec3(0.1, -0.2, 0.3)).norm(), 1e-12);
+}
+
+TEST(RefinedKeyframePoses, ThoseThatHaveNotChangedAreKept) {
+  std::vector<KeyframePose> keyframes = {keyframe(0, at(0)), keyframe(1, at(1))};
+  std::vector<SE3> poses;
+  refine_keyframe_poses(keyframes, 0, &poses);
+  keyframes[0].step = Vec3(50, 0, 0);
+  keyframes[1].step = Vec3(2, 0, 0);
+  keyframes.push_back(keyframe(2, at(1)));
+  refine_keyframe_poses(keyframes, 1, &poses);
+  ASSERT_EQ(poses.size(), 3U);
+  EXPECT_EQ(poses[0].translation().x(), 0.0);
+  EXPECT_EQ(poses[1].translation().x(), 2.0);
+  EXPECT_EQ(poses[2].translation().x(), 3.0);
 }
 
 TEST(RefinedKeyframePoses, OfNoneAreNone) { EXPECT_TRUE(refined_keyframe_poses({}).empty()); }

@@ -23,18 +23,24 @@ inline std::uint8_t pattern_bit(std::uint32_t number, bool right, int x) {
   return x == kPatternBits && right ? 235 : 16;
 }
 
-/// Draws the image as YUYV, width * height * 2 bytes. Precondition: halves wider than 33 pixels.
-inline void draw_pattern(std::uint32_t number, int width, int height, std::uint8_t* yuyv) {
-  const int half = width / 2;
+/// Draws one side as YUYV; `stride`: bytes from a row to the next. Precondition: wider than 33
+/// pixels.
+inline void draw_side(std::uint32_t number, bool right, int width, int height, std::size_t stride,
+                      std::uint8_t* yuyv) {
   for (int y = 0; y < height; ++y) {
-    for (int side = 0; side < 2; ++side) {
-      std::uint8_t* row = yuyv + 2 * (static_cast<std::size_t>(y) * width + side * half);
-      const std::uint8_t level = pattern_level(number, side == 1, y);
-      const std::uint8_t pixel[4] = {level, 128, level, 128};
-      for (int x = 0; x < half; x += 2) std::memcpy(row + 2 * x, pixel, 4);
-      for (int x = 0; y == 0 && x < half; ++x) row[2 * x] = pattern_bit(number, side == 1, x);
-    }
+    std::uint8_t* row = yuyv + stride * static_cast<std::size_t>(y);
+    const std::uint8_t level = pattern_level(number, right, y);
+    const std::uint8_t pixel[4] = {level, 128, level, 128};
+    for (int x = 0; x < width; x += 2) std::memcpy(row + 2 * x, pixel, 4);
+    for (int x = 0; y == 0 && x < width; ++x) row[2 * x] = pattern_bit(number, right, x);
   }
+}
+
+/// Draws both sides beside each other, width * height * 2 bytes.
+inline void draw_pattern(std::uint32_t number, int width, int height, std::uint8_t* yuyv) {
+  const auto stride = 2 * static_cast<std::size_t>(width);
+  draw_side(number, false, width / 2, height, stride, yuyv);
+  draw_side(number, true, width / 2, height, stride, yuyv + width);
 }
 
 /// The number of a half image; nothing when it is not whole, or of the other side.

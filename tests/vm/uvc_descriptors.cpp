@@ -56,14 +56,28 @@ void append_bytes(Bytes* out, const Bytes& more) {
 
 }  // namespace
 
-std::vector<UvcMode> zed_modes() {
-  return {{4416, 1242, {15}},
-          {3840, 1080, {30, 15}},
-          {2560, 720, {60, 30, 15}},
-          {1344, 376, {100, 60, 30, 15}}};
+UvcModel zed_model() {
+  return {0x2b03,
+          0xf582,
+          "Technologies, Inc.",
+          "ZED",
+          "0012345",
+          {{4416, 1242, {15}},
+           {3840, 1080, {30, 15}},
+           {2560, 720, {60, 30, 15}},
+           {1344, 376, {100, 60, 30, 15}}}};
 }
 
-std::vector<UvcControl> zed_controls() {
+UvcModel eye_model(bool right) {
+  return {0x1209,
+          0x0001,
+          "Eyes",
+          right ? "Eye right" : "Eye left",
+          right ? "0000002" : "0000001",
+          {{640, 480, {30, 10}}, {320, 240, {30, 10}}}};
+}
+
+std::vector<UvcControl> usual_controls() {
   return {{2, 2, 2, 0, 8, 1, 4, 4},
           {2, 3, 2, 0, 8, 1, 4, 4},
           {2, 6, 2, 0, 11, 1, 0, 0},
@@ -77,8 +91,12 @@ std::vector<UvcControl> zed_controls() {
           {1, 4, 4, 1, 300, 1, 100, 100}};
 }
 
-Bytes device_descriptor() {
-  return {18, 1, 0x00, 0x02, 0xEF, 2, 1, 64, 0x03, 0x2b, 0x82, 0xf5, 0x00, 0x01, 1, 2, 3, 1};
+Bytes device_descriptor(const UvcModel& model) {
+  Bytes bytes{18, 1, 0x00, 0x02, 0xEF, 2, 1, 64};
+  append16(&bytes, model.vendor);
+  append16(&bytes, model.product);
+  append(&bytes, {0x00, 0x01, 1, 2, 3, 1});
+  return bytes;
 }
 
 Bytes configuration_descriptor(const std::vector<UvcMode>& modes) {

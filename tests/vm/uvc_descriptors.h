@@ -50,12 +50,25 @@ struct UvcControl {
   int value;
 };
 
-/// The modes of a ZED.
-std::vector<UvcMode> zed_modes();
-/// Its standard controls, and exposure time and automatic exposure as other cameras have them.
-std::vector<UvcControl> zed_controls();
+/// A camera as it tells of itself.
+struct UvcModel {
+  std::uint32_t vendor;
+  std::uint32_t product;
+  std::string maker;
+  std::string name;
+  std::string serial;
+  std::vector<UvcMode> modes;
+};
 
-Bytes device_descriptor();
+/// A ZED, whose images have both sides.
+UvcModel zed_model();
+/// A camera of one side.
+UvcModel eye_model(bool right);
+/// The standard controls of a ZED, and exposure time and automatic exposure as other cameras have
+/// them.
+std::vector<UvcControl> usual_controls();
+
+Bytes device_descriptor(const UvcModel& model);
 Bytes configuration_descriptor(const std::vector<UvcMode>& modes);
 Bytes string_descriptor(const std::string& text);
 

@@ -37,5 +37,20 @@ TEST(WindowTest, AStereoMatchCountsWhereThereIsNoParallax) {
   }
 }
 
+TEST(WindowTest, WhatAnErasedKeyframeSawIsForgottenAndItsSlotUsedAgain) {
+  Window window = scene_window(3, 6, 1);
+  const auto slot = static_cast<std::size_t>(window[1].slot);
+  ASSERT_FALSE(window[0].points.empty());
+  Residual& residual = window[0].points[0].residuals[slot];
+  residual.state = ResidualState::kOutlier;
+  residual.energy = 7.0F;
+  window.erase(1);
+  EXPECT_EQ(window.size(), 2);
+  EXPECT_EQ(residual.state, ResidualState::kAbsent);
+  EXPECT_EQ(residual.energy, 0.0F);
+  const Keyframe& next = window.insert(make_keyframe(9, nullptr, SE3()));
+  EXPECT_EQ(static_cast<std::size_t>(next.slot), slot);
+}
+
 }  // namespace
 }  // namespace sovo

@@ -121,16 +121,24 @@ Result<DeviceInfo> find_device(const std::vector<DeviceInfo>& devices, const std
   return only_one(std::move(found), "'" + wish + "'", devices);
 }
 
+bool is_same(const DeviceInfo& a, const DeviceInfo& b) {
+  if (a.vendor_id.empty() || b.vendor_id.empty()) return a.path == b.path;
+  return a.port == b.port && a.serial == b.serial;
+}
+
 Result<DeviceInfo> find_again(const std::vector<DeviceInfo>& devices, const DeviceInfo& known,
-                              const std::string& wish) {
+                              const std::string& wish, const std::vector<DeviceInfo>& others) {
   if (known.vendor_id.empty()) return find_device(devices, wish);
   const auto alike = those(devices, [&known](const DeviceInfo& info) {
     return info.vendor_id == known.vendor_id && info.product_id == known.product_id &&
            info.index == known.index;
   });
   const auto same_port = those(alike, [&known](const auto& i) { return i.port == known.port; });
-  const auto same_serial = those(
-      alike, [&known](const auto& i) { return !known.serial.empty() && i.serial == known.serial; });
+  const bool telling = !known.serial.empty() &&
+                       std::none_of(others.begin(), others.end(),
+                                    [&known](const auto& o) { return o.serial == known.serial; });
+  const auto same_serial =
+      those(alike, [&](const auto& i) { return telling && i.serial == known.serial; });
   const auto same_both =
       those(same_port, [&known](const auto& i) { return i.serial == known.serial; });
   for (const auto& found : {same_both, same_serial, same_port}) {

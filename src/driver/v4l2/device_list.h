@@ -37,10 +37,15 @@ std::vector<DeviceInfo> list_devices(const DeviceTree& tree = {});
 /// what there is.
 Result<DeviceInfo> find_device(const std::vector<DeviceInfo>& devices, const std::string& wish);
 
+/// Whether both are one camera: at the same port with the same serial number, or at the same path
+/// where that is no USB device.
+bool is_same(const DeviceInfo& a, const DeviceInfo& b);
+
 /// The same device after it was plugged in again, perhaps with another number: by serial number and
-/// port, else by port, else by serial number, of the same make; as `find_device` for what is no USB
-/// device.
+/// port, else by serial number, else by port, of the same make; as `find_device` for what is no USB
+/// device. A serial number that one of `others`, the rig's other cameras, has as well tells
+/// nothing.
 Result<DeviceInfo> find_again(const std::vector<DeviceInfo>& devices, const DeviceInfo& known,
-                              const std::string& wish);
+                              const std::string& wish, const std::vector<DeviceInfo>& others = {});
 
 }  // namespace sovo::v4l2

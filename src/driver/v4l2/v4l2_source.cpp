@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "sovo/driver/v4l2/capture.h"
-#include "sovo/driver/v4l2/device_list.h"
+#include "sovo/driver/v4l2/device_finder.h"
 #include "sovo/driver/v4l2/zed_controls.h"
 
 namespace sovo::v4l2 {
@@ -18,23 +18,6 @@ constexpr const char* kZedSettings = "/usr/local/zed/settings";
 constexpr double kUsualRate = 30.0;     // where neither driver nor user says one [Hz]
 constexpr std::size_t kImages = 12;     // a side: queue, pairing, publishing and room
 constexpr std::uint8_t kHostClock = 0;  // of StereoFrame::clock
-
-/// Finds a device by what the user called it, and later the same device again.
-class DeviceFinder {
- public:
-  explicit DeviceFinder(std::string wish) : wish_(std::move(wish)) {}
-
-  Result<DeviceInfo> find() {
-    const auto devices = list_devices();
-    auto found = known_ ? find_again(devices, *known_, wish_) : find_device(devices, wish_);
-    if (found) known_ = *found;
-    return found;
-  }
-
- private:
-  std::string wish_;
-  std::optional<DeviceInfo> known_;
-};
 
 /// Calibration that Stereolabs' programs leave on the machine.
 std::string zed_settings(const std::string& serial) {
@@ -105,8 +88,8 @@ CaptureOptions capture_options(const V4l2Options& options, const CameraModel& ca
   return capture;
 }
 
-LiveCamera make_camera(const std::string& name, const Probe& probe, const CaptureOptions& capture,
-                       const LiveOptions& live, double rate) {
+LiveCamera make_camera(const std::string& name, CameraWorker::Open open, const LiveOptions& live,
+                       double rate) {
   LiveCamera camera;
   camera.config.name = name;
   camera.config.stall = std::chrono::milliseconds(std::lround(1e3 * live.stall_s));
@@ -119,12 +102,7 @@ LiveCamera make_camera(const std::string& name, const Probe& probe, const Captur
   camera.config.clock.step_readings = 1;
   camera.config.clock.late_step_s = 0.0;
   camera.config.clock.first_sigma_s = 50e-6;
-  const auto finder = std::make_shared<DeviceFinder>(probe.wish);
-  camera.open = [finder, capture]() -> Result<std::unique_ptr<CaptureDevice>> {
-    const auto info = finder->find();
-    if (!info) return info.failure();
-    return V4l2Capture::open(info->path, capture);
-  };
+  camera.open = std::move(open);
   return camera;
 }
 
@@ -136,6 +114,21 @@ Result<void> check_fit(const Probe& probe, const CameraModel& camera, bool side_
   options.height = camera.height;
   if (auto fits = check_size(*probe.mode, options); !fits) {
     return Error{probe.info->path + ": " + fits.error()};
+  }
+  return {};
+}
+
+/// Whether the two make a pair.
+Result<void> check_pair(const Probe& left, const Probe& right, OpenedSource* opened) {
+  if (left.info && right.info && is_same(*left.info, *right.info)) {
+    return Error{"'" + left.wish + "' and '" + right.wish + "' are the same device, " +
+                 left.info->path};
+  }
+  const bool known = left.mode && right.mode;
+  if (known && std::abs(left.mode->frame_rate / right.mode->frame_rate - 1.0) > 0.01) {
+    opened->notes.push_back("left gives " + to_string(*left.mode) + ", right " +
+                            to_string(*right.mode) +
+                            ": images without a partner go alone; --rate sets both");
   }
   return {};
 }
@@ -184,17 +177,26 @@ Result<OpenedSource> open_v4l2(const V4l2Options& options, const LiveOptions& li
   config.pair_tolerance_ns = live.tolerance_ns(rate);
   config.colour_wanted = std::make_shared<std::atomic<bool>>(false);
   if (live.auto_exposure.enabled) config.auto_exposure = live.auto_exposure.config();
-  const auto make = [&](const char* name, const Probe& found, const CameraModel& model) {
-    return make_camera(name, found, capture_options(options, model, config.colour_wanted), live,
-                       rate);
-  };
+  const auto finder = std::make_shared<DeviceFinder>(two ? std::vector{options.left, options.right}
+                                                         : std::vector{options.device});
   std::vector<LiveCamera> cameras;
-  cameras.push_back(make(two ? "left" : "camera", *left, rig.left));
+  const auto add = [&](const char* name, const CameraModel& model) {
+    const auto open = [finder, i = cameras.size(),
+                       capture = capture_options(options, model, config.colour_wanted)]()
+        -> Result<std::unique_ptr<CaptureDevice>> {
+      const auto info = finder->find(i);
+      if (!info) return info.failure();
+      return V4l2Capture::open(info->path, capture);
+    };
+    cameras.push_back(make_camera(name, open, live, rate));
+  };
+  add(two ? "left" : "camera", rig.left);
   if (two) {
     const auto right = probe(options.right, options, &opened);
     if (!right) return right.failure();
     if (auto fits = check_fit(*right, rig.right, false); !fits) return fits.failure();
-    cameras.push_back(make("right", *right, rig.right));
+    if (auto apart = check_pair(*left, *right, &opened); !apart) return apart.failure();
+    add("right", rig.right);
   }
   opened.source = std::make_unique<LiveSource>(rig, config, std::move(cameras));
   return opened;

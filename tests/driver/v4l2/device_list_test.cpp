@@ -6,6 +6,7 @@
 
 #include "io/io_test_support.h"
 #include "sovo/driver/v4l2/controls.h"
+#include "sovo/driver/v4l2/device_finder.h"
 
 namespace sovo::v4l2 {
 namespace {
@@ -34,9 +35,8 @@ class DeviceLists : public testing::Test {
     folder_.write("class/video" + std::to_string(number) + "/name", name + "\n");
     folder_.write("dev/video" + std::to_string(number), "");
   }
-  std::vector<DeviceInfo> list() const {
-    return list_devices({folder_ / "class", folder_ / "dev"});
-  }
+  DeviceTree tree() const { return {folder_ / "class", folder_ / "dev"}; }
+  std::vector<DeviceInfo> list() const { return list_devices(tree()); }
   std::string dev(const std::string& name) const { return folder_ / ("dev/" + name); }
 
   TemporaryFolder folder_;
@@ -91,6 +91,52 @@ TEST_F(DeviceLists, APluggedInCameraIsKnownAgainUnderAnotherNumber) {
   EXPECT_EQ(find_again(list(), *known, dev("video1"))->path, dev("video4"));
   fs::remove_all(folder_ / "class");
   EXPECT_TRUE(contains(find_again(list(), *known, dev("video1")).error(), "is gone"));
+}
+
+TEST_F(DeviceLists, TwoCamerasOfOneSerialNumberAreNeverExchanged) {
+  // A hub with both is unplugged, and the right one is there again before the left one.
+  add_usb(0, "1-4", "046d:0825", "0001");
+  add_usb(1, "1-5", "046d:0825", "0001");
+  DeviceFinder finder({"1-4", dev("video1")}, tree());
+  EXPECT_EQ(finder.find(0)->path, dev("video0"));
+  EXPECT_EQ(finder.find(1)->path, dev("video1"));
+  fs::remove_all(folder_ / "class");
+  add_usb(0, "1-5", "046d:0825", "0001");
+  const auto left = finder.find(0);
+  ASSERT_FALSE(left) << left->path;
+  EXPECT_TRUE(contains(left.error(), "port 1-4) is gone")) << left.error();
+  EXPECT_EQ(finder.find(1)->path, dev("video0"));
+  add_usb(1, "1-4", "046d:0825", "0001");
+  EXPECT_EQ(finder.find(0)->path, dev("video1"));
+}
+
+TEST_F(DeviceLists, ASerialNumberOfItsOwnIsFollowedToTheOthersPort) {
+  add_usb(0, "1-4", "046d:0825", "0001");
+  add_usb(1, "1-5", "046d:0825", "0002");
+  DeviceFinder finder({"0001", "0002"}, tree());
+  EXPECT_EQ(finder.find(0)->path, dev("video0"));
+  EXPECT_EQ(finder.find(1)->path, dev("video1"));
+  fs::remove_all(folder_ / "class");
+  add_usb(2, "1-5", "046d:0825", "0001");
+  EXPECT_EQ(finder.find(0)->path, dev("video2"));
+  EXPECT_FALSE(finder.find(1));
+  add_usb(3, "1-4", "046d:0825", "0002");
+  EXPECT_EQ(finder.find(1)->path, dev("video3"));
+}
+
+TEST_F(DeviceLists, OneCameraIsNotBoth) {
+  add_usb(0, "1-4", "046d:0825", "0001");
+  add_virtual(7, "loopback");
+  for (const auto& [wish, path] : {std::pair("0001", "video0"), std::pair("video7", "video7")}) {
+    const std::string left = wish[0] == 'v' ? dev(wish) : wish;
+    const std::string link = folder_ / ("link_to_" + std::string(path));
+    fs::create_symlink(dev(path), link);
+    DeviceFinder finder({left, link}, tree());
+    ASSERT_TRUE(finder.find(0));
+    const auto right = finder.find(1);
+    ASSERT_FALSE(right);
+    EXPECT_TRUE(contains(right.error(), "the other camera already")) << right.error();
+  }
 }
 
 TEST(Controls, NamesAreThoseOfV4l2Ctl) {

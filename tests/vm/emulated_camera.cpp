@@ -1,7 +1,12 @@
-// A camera like the ZED, emulated as a USB device behind the kernel's vhci_hcd, so that the real
-// uvcvideo driver binds to it. It streams the pattern of pattern.h. Ending the process unplugs it.
+// A USB camera emulated behind the kernel's vhci_hcd, so that the real uvcvideo driver binds to it.
+// It streams the pattern of pattern.h. Ending the process unplugs it.
 //
-//     emulated_zed [PORT]
+//     emulated_camera PORT zed
+//     emulated_camera PORT left|right [LATE_MS]
+//
+// The first is like a ZED. The others have one side each and expose at the same instants, multiples
+// of the frame period by CLOCK_MONOTONIC, whose count is the image's number; LATE_MS later if
+// given.
 
 #include <fcntl.h>
 #include <sys/socket.h>
@@ -34,13 +39,55 @@ constexpr std::size_t kLargestOutput = 65536;
 /// UVC's requests.
 enum Request { kSetCur = 1, kGetCur = 0x81, kGetMin, kGetMax, kGetRes, kGetLen, kGetInfo, kGetDef };
 
-class EmulatedZed {
+enum class Sides { kBoth, kLeft, kRight };
+
+/// When images are taken, and their numbers.
+class Shutter {
  public:
-  explicit EmulatedZed(int socket) : socket_(socket) {
+  using Clock = std::chrono::steady_clock;
+
+  /// `by_clock`: numbers and instants are those of the clock, `late` after the period's multiples;
+  /// an instant that was missed has no image. Else each image is one period after the last, or as
+  /// soon as it can be, and the numbers have no gaps.
+  Shutter(bool by_clock, Clock::duration late) : by_clock_(by_clock), late_(late) {}
+
+  void restart() { due_ = Clock::now(); }
+
+  /// Number of the next image.
+  std::uint32_t prepare(Clock::duration period) {
+    period_ = period;
+    if (by_clock_) {
+      const auto number = (Clock::now().time_since_epoch() - late_) / period + 1;
+      due_ = Clock::time_point(number * period + late_);
+      return static_cast<std::uint32_t>(number);
+    }
+    return number_++;
+  }
+
+  /// Waits for its instant; false when that has passed.
+  bool release() {
+    std::this_thread::sleep_until(due_);
+    if (by_clock_) return Clock::now() - due_ < period_ / 8;
+    due_ = std::max(due_ + period_, Clock::now());
+    return true;
+  }
+
+ private:
+  const bool by_clock_;
+  const Clock::duration late_;
+  Clock::duration period_{};
+  Clock::time_point due_ = Clock::now();
+  std::uint32_t number_ = 0;
+};
+
+class EmulatedCamera {
+ public:
+  EmulatedCamera(int socket, Sides sides, std::chrono::milliseconds late)
+      : socket_(socket), sides_(sides), shutter_(sides != Sides::kBoth, late) {
     probe_ = fixed_probe(Bytes(34));
     streamer_ = std::thread([this] { stream(); });
   }
-  ~EmulatedZed() {
+  ~EmulatedCamera() {
     {
       const std::scoped_lock lock(mutex_);
       stop_ = true;
@@ -48,8 +95,8 @@ class EmulatedZed {
     changed_.notify_all();
     streamer_.join();
   }
-  EmulatedZed(const EmulatedZed&) = delete;
-  EmulatedZed& operator=(const EmulatedZed&) = delete;
+  EmulatedCamera(const EmulatedCamera&) = delete;
+  EmulatedCamera& operator=(const EmulatedCamera&) = delete;
 
   /// Answers the kernel until it lets go.
   void serve() {
@@ -151,10 +198,10 @@ class EmulatedZed {
   Bytes standard(const ControlRequest& request, bool* known) {
     const int kind = request.value >> 8;
     const int index = request.value & 255;
-    if (request.request == 6 && kind == 1) return device_descriptor();
-    if (request.request == 6 && kind == 2) return configuration_descriptor(modes_);
+    if (request.request == 6 && kind == 1) return device_descriptor(model_);
+    if (request.request == 6 && kind == 2) return configuration_descriptor(model_.modes);
     if (request.request == 6 && kind == 3) {
-      const char* const texts[] = {"", "Technologies, Inc.", "ZED", "0012345"};
+      const std::string texts[] = {"", model_.maker, model_.name, model_.serial};
       if (index == 0) return {4, 3, 9, 4};
       if (index < 4) return string_descriptor(texts[index]);
     }
@@ -171,8 +218,10 @@ class EmulatedZed {
   Bytes fixed_probe(Bytes probe) const {
     probe.resize(34);
     probe[2] = 1;
-    if (probe[3] < 1 || probe[3] > modes_.size()) probe[3] = 3;
-    const UvcMode& mode = modes_[probe[3] - 1U];
+    if (probe[3] < 1 || probe[3] > model_.modes.size()) {
+      probe[3] = static_cast<std::uint8_t>(std::min<std::size_t>(3, model_.modes.size()));
+    }
+    const UvcMode& mode = model_.modes[probe[3] - 1U];
     const double wanted = get32(probe, 4);
     std::uint32_t best = kTicks / mode.rates.front();
     for (const std::uint32_t rate : mode.rates) {
@@ -244,35 +293,43 @@ class EmulatedZed {
   void set_streaming(bool on) {
     const std::scoped_lock lock(mutex_);
     streaming_ = on;
-    mode_ = modes_[probe_[3] - 1U];
+    mode_ = model_.modes[probe_[3] - 1U];
     interval_ = std::chrono::nanoseconds(100LL * get32(probe_, 4));
     changed_.notify_all();
   }
 
   void stream() {
-    std::uint32_t number = 0;
     Bytes image;
-    auto due = std::chrono::steady_clock::now();
+    bool frame_id = false;
     while (true) {
       UvcMode mode;
+      std::uint32_t number = 0;
       {
         std::unique_lock lock(mutex_);
         if (!streaming_ || waiting_.empty()) {
           changed_.wait(lock, [this] { return stop_ || (streaming_ && !waiting_.empty()); });
-          due = std::chrono::steady_clock::now();
+          shutter_.restart();
         }
         if (stop_) return;
         mode = mode_;
-        due += interval_;
+        number = shutter_.prepare(interval_);
       }
-      image.resize(mode.bytes());
-      draw_pattern(number, static_cast<int>(mode.width), static_cast<int>(mode.height),
-                   image.data());
-      send(image, (number & 1U) != 0);
-      ++number;
-      std::this_thread::sleep_until(due);
-      // An image that is late is made all the same: the pattern's numbers have no gaps.
-      due = std::max(due, std::chrono::steady_clock::now() - interval_);
+      draw(number, mode, &image);
+      if (!shutter_.release()) continue;
+      send(image, frame_id);
+      frame_id = !frame_id;
+    }
+  }
+
+  void draw(std::uint32_t number, const UvcMode& mode, Bytes* image) const {
+    image->resize(mode.bytes());
+    const int width = static_cast<int>(mode.width);
+    const int height = static_cast<int>(mode.height);
+    if (sides_ == Sides::kBoth) {
+      draw_pattern(number, width, height, image->data());
+    } else {
+      draw_side(number, sides_ == Sides::kRight, width, height, 2 * std::size_t{mode.width},
+                image->data());
     }
   }
 
@@ -310,8 +367,9 @@ class EmulatedZed {
   }
 
   const int socket_;
-  const std::vector<UvcMode> modes_ = zed_modes();
-  std::vector<UvcControl> controls_ = zed_controls();
+  const Sides sides_;
+  const UvcModel model_ = sides_ == Sides::kBoth ? zed_model() : eye_model(sides_ == Sides::kRight);
+  std::vector<UvcControl> controls_ = usual_controls();
   Bytes probe_;
   std::mutex write_mutex_;
   std::mutex answer_mutex_;
@@ -322,6 +380,7 @@ class EmulatedZed {
   bool stop_ = false;
   UvcMode mode_{};
   std::chrono::nanoseconds interval_{33'333'300};
+  Shutter shutter_;  ///< Of the streaming thread.
   std::thread streamer_;
 };
 
@@ -334,7 +393,7 @@ bool attach(int port, int socket) {
   const int file = ::open("/sys/devices/platform/vhci_hcd.0/attach", O_WRONLY | O_CLOEXEC);
   const bool done =
       file >= 0 && ::write(file, text.data(), text.size()) == static_cast<ssize_t>(text.size());
-  if (!done) std::perror("emulated_zed: vhci_hcd does not take the device");
+  if (!done) std::perror("emulated_camera: vhci_hcd does not take the device");
   if (file >= 0) ::close(file);
   return done;
 }
@@ -343,18 +402,23 @@ bool attach(int port, int socket) {
 }  // namespace sovo::test
 
 int main(int argc, char** argv) {
+  using sovo::test::Sides;
   std::signal(SIGPIPE, SIG_IGN);
+  if (argc < 3) return 2;
+  const std::string kind = argv[2];
+  const Sides sides = kind == "zed" ? Sides::kBoth : kind == "left" ? Sides::kLeft : Sides::kRight;
+  const std::chrono::milliseconds late(argc > 3 ? std::atoi(argv[3]) : 0);
   int sockets[2];
   if (::socketpair(AF_UNIX, SOCK_STREAM, 0, sockets) != 0) {
-    std::perror("emulated_zed: socketpair");
+    std::perror("emulated_camera: socketpair");
     return 1;
   }
   for (const int socket : sockets) {
     const int size = 4 << 20;
     ::setsockopt(socket, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
   }
-  if (!sovo::test::attach(argc > 1 ? std::atoi(argv[1]) : 0, sockets[1])) return 1;
+  if (!sovo::test::attach(std::atoi(argv[1]), sockets[1])) return 1;
   ::close(sockets[1]);
-  sovo::test::EmulatedZed(sockets[0]).serve();
+  sovo::test::EmulatedCamera(sockets[0], sides, late).serve();
   return 0;
 }

@@ -2,11 +2,12 @@
 // What drawing the dashboard's page takes: the full scene (2000 window points, 5000 keyframes, a
 // map, four minutes of trajectory), turned by hand while frames, clouds and pictures keep coming.
 //
-// Usage: bench/dashboard_page.mjs [--page FOLDER] [--seconds N] [--gpu] [--tab Plots|Health|Tools]
-//          [--hide Map,Keyframes,...] [--still] [--trace FILE] [--screenshot FILE]
+// Usage: bench/dashboard_page.mjs [--page FOLDER] [--seconds N] [--gpu | --fine] [--still]
+//          [--tab Plots|Health|Tools] [--hide Map,Keyframes,...] [--trace FILE] [--screenshot FILE]
 //
 //   --page FOLDER    the built page (build/release/share/sovo/dashboard)
 //   --gpu            with this machine's graphics card, if Chromium finds one; else in software
+//   --fine           in software, but as finely as with a graphics card
 //   --hide LAYERS    without these layers of the room
 //   --still          not turned by hand: only the data change
 //   --trace FILE     Chromium's own trace of it, for chrome://tracing
@@ -36,6 +37,7 @@ const { values: options } = parseArgs({
     page: { type: "string", default: path.join(root, "build/release/share/sovo/dashboard") },
     seconds: { type: "string", default: "10" },
     gpu: { type: "boolean", default: false },
+    fine: { type: "boolean", default: false },
     tab: { type: "string", default: "Plots" },
     hide: { type: "string", default: "" },
     still: { type: "boolean", default: false },
@@ -67,10 +69,23 @@ async function measure(browser, page) {
   );
 }
 
+/** The page asks the graphics card's name to know whether it is one. */
+async function pretendGraphicsCard(page) {
+  await page.addInitScript(() => {
+    const kind = WebGL2RenderingContext.prototype;
+    const { getParameter } = kind;
+    const kUnmaskedRenderer = 0x9246;
+    kind.getParameter = function (name) {
+      return name === kUnmaskedRenderer ? "graphics card" : getParameter.call(this, name);
+    };
+  });
+}
+
 async function run(browser, vehicle) {
   const page = await browser.newPage({ viewport: { width: 1280, height: 720 } });
   page.setDefaultTimeout(120_000);
   await countDrawing(page);
+  if (options.fine) await pretendGraphicsCard(page);
   await page.goto(vehicle.url);
   await until(() => vehicle.subscribed(), "subscriptions");
   await sail(vehicle, 0, kSailed);

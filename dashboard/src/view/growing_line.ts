@@ -2,6 +2,7 @@ import {
   BufferAttribute,
   BufferGeometry,
   type Color,
+  DoubleSide,
   DynamicDrawUsage,
   GLSL3,
   InterleavedBuffer,
@@ -87,6 +88,7 @@ export class GrowingLine {
       fragmentShader: kFragmentShader,
       uniforms: { resolution: { value: new Vector2(1, 1) }, width: { value: width }, opacity: { value: opacity } },
       transparent: opacity < 1,
+      side: DoubleSide,
     });
     this.object = new Mesh(new BufferGeometry(), material);
     this.object.frustumCulled = false;

@@ -276,11 +276,15 @@ export class GroundGrid {
     this.key = key;
     const [fine, strong]: [number[], number[]] = [[], []];
     const n = 40;
-    const reach = n * this.step;
+    // In pieces: a renderer may lose a whole line that passes behind the eye.
+    const piece = 8;
     for (let i = -n; i <= n; ++i) {
       const out = i % 5 === 0 ? strong : fine;
       const [gx, gy] = [cx + i * this.step, cy + i * this.step];
-      out.push(gx, cy - reach, 0, gx, cy + reach, 0, cx - reach, gy, 0, cx + reach, gy, 0);
+      for (let k = -n; k < n; k += piece) {
+        const [from, to] = [k * this.step, (k + piece) * this.step];
+        out.push(gx, cy + from, 0, gx, cy + to, 0, cx + from, gy, 0, cx + to, gy, 0);
+      }
     }
     setPositions(this.fine, new Float32Array(fine));
     setPositions(this.strong, new Float32Array(strong));

@@ -52,8 +52,11 @@ int report(const ReportArguments& a, const AppConfig& config) {
     if (!evaluated) return fail(kBadInput, evaluated.error());
     evaluation = std::move(*evaluated);
   }
-  const auto map = map_points(*dive, config.odometry, kMostMapPoints);
-  const std::string page = format_report_page(*dive, evaluation, map);
+  std::vector<std::vector<Vec3>> maps;
+  for (const Dive& run : shown_runs(*dive)) {
+    maps.push_back(map_points(run, config.odometry, kMostMapPoints));
+  }
+  const std::string page = format_report_page(*dive, evaluation, maps);
   if (auto written = write_text_file(a.out, page); !written) return fail(kFailed, written.error());
   std::cout << std::filesystem::absolute(a.out).lexically_normal().string() << std::endl;
   return kOk;

@@ -10,6 +10,7 @@
 #include "io/io_test_support.h"
 #include "sovo/app/report/dive_evaluation.h"
 #include "sovo/app/report/dive_map.h"
+#include "sovo/app/report/dive_runs.h"
 #include "sovo/app/report/dive_summary.h"
 #include "sovo/app/report/health_timeline.h"
 #include "sovo/app/report/html.h"
@@ -116,8 +117,7 @@ TEST(DiveSummary, CountsOverARestart) {
     s.latency_s = 0.001 * static_cast<double>(i);
   }
   DivePose& anew = dive.poses.back();  // another odometry, elsewhere
-  dive.poses[99].keyframe_id = 3;
-  anew.keyframe_id = 0;
+  anew.run = 1;
   anew.T_odom_base = SE3();
   const DiveSummary sum = summarize(dive);
   EXPECT_EQ(sum.segments, 2U);
@@ -175,9 +175,9 @@ TEST(DiveMap, PutsPointsWhereTheyWereSeen) {
   keyframe.v = {239.5F, 239.5F, 10.0F};
   keyframe.inverse_depth = {0.5F, 0.25F, 0.5F};
   keyframe.sigma = {0.01F, 0.01F, 0.4F};  // the last one is anywhere
-  dive.keyframes[{0, 1}] = keyframe;
+  dive.keyframes.push_back(keyframe);
   keyframe.metric = false;
-  dive.keyframes[{0, 2}] = keyframe;
+  dive.keyframes.push_back(keyframe);
   StereoOdometryConfig config;
   const auto points = map_points(dive, config, 100);
   ASSERT_EQ(points.size(), 2U);
@@ -210,7 +210,7 @@ TEST(ReportPage, NothingOfTheRecordingBecomesMarkup) {
   dive.stages[kHostile] = {1.0, 2.0};
   dive.topics.push_back({kHostile, kHostile, 3, kHostile});
   dive.notes.emplace_back(kHostile);
-  const std::string page = format_report_page(dive, std::nullopt, {Vec3(1, 2, 3), Vec3(2, 3, 4)});
+  const std::string page = format_report_page(dive, std::nullopt, {{Vec3(1, 2, 3), Vec3(2, 3, 4)}});
   EXPECT_TRUE(contains(page, "alert(1)"));
   std::set<std::string> more = elements_of(page);
   for (const std::string& name : usual) more.erase(name);
@@ -304,6 +304,44 @@ class ReportFile : public ::testing::Test {
     return folder_ / "dive.mcap";
   }
 
+  /// Twenty frames and a keyframe, revised; then again by an odometry that was started anew in the
+  /// same second, twice as fast.
+  std::string write_restarted() {
+    RecordingConfig config;
+    config.min_free_bytes = 0;
+    writer_ = std::move(*RecordingWriter::create(folder_ / "restarted.mcap", config));
+    const auto status = add_topic<msg::VoStatus>("/auv1/status");
+    const auto odometry = add_topic<msg::ScaledOdometry>("/auv1/scaled_odometry");
+    const auto keyframe = add_topic<msg::Keyframe>("/auv1/keyframe");
+    const auto write_keyframe = [&](int i, int frame, double x) {
+      msg::Keyframe k{};
+      k.header = {bridge::to_message(static_cast<std::int64_t>(kBegin) + frame),
+                  bridge::borrow("odom")};
+      k.pose = bridge::to_pose(SE3(SO3(), Vec3(x, 0, 0)));
+      write(keyframe, i, k);
+    };
+    for (int i = 0; i < 40; ++i) {
+      const int since = i % 20;
+      const auto stamp = bridge::to_message(static_cast<std::int64_t>(kBegin) + i);
+      msg::VoStatus s{};
+      s.header = {stamp, bridge::borrow("odom")};
+      s.state = 1;
+      s.reason = s.last_command_result = bridge::borrow("");
+      s.received = static_cast<std::uint64_t>(1 + since);
+      msg::ScaledOdometry o{};
+      o.header = {stamp, bridge::borrow("odom")};
+      o.child_frame_id = bridge::borrow("base_link");
+      o.pose.pose = bridge::to_pose(SE3(SO3(), Vec3((i < 20 ? 0.1 : 0.2) * since, 0, 0)));
+      o.scale_valid = true;
+      if (since == 0) write_keyframe(i, i, i < 20 ? 5.0 : 9.0);  // may come before its status
+      write(odometry, i, o);
+      write(status, i, s);
+      if (i == 10) write_keyframe(i, 0, 7.0);
+    }
+    EXPECT_TRUE(writer_->close().ok());
+    return folder_ / "restarted.mcap";
+  }
+
   TemporaryFolder folder_;
   std::unique_ptr<RecordingWriter> writer_;
   std::optional<std::mt19937> damage_;
@@ -324,6 +362,28 @@ TEST_F(ReportFile, IsReadAsItWasWritten) {
   EXPECT_TRUE(contains(page, "&lt;script&gt;"));
   EXPECT_TRUE(read_dive(path, "auv1").ok());
   EXPECT_TRUE(contains(read_dive(path, "auv2").error(), "below /auv1"));
+}
+
+TEST_F(ReportFile, KeepsTheRunsOfARestartedOdometryApart) {
+  const auto dive = read_dive(write_restarted(), "");
+  ASSERT_TRUE(dive.ok()) << dive.error();
+  EXPECT_EQ(count_runs(*dive), 2U);
+  EXPECT_EQ(dive->keyframes.size(), 2U);  // one revised, and another one of the same number
+  const DiveSummary sum = summarize(*dive);
+  EXPECT_NEAR(sum.distance_m, 1.9 + 3.8, 1e-9);
+  EXPECT_EQ(sum.segments, 2U);
+  const std::vector<Dive> runs = runs_of(*dive, 5);
+  ASSERT_EQ(runs.size(), 2U);
+  for (std::size_t k = 0; k < 2; ++k) {
+    EXPECT_EQ(runs[k].poses.size(), 20U);
+    ASSERT_EQ(runs[k].keyframes.size(), 1U);
+    const double x = k == 0 ? 7.0 : 9.0;  // the first one as it was revised
+    EXPECT_NEAR(runs[k].keyframes[0].T_odom_left.translation().x(), x, 1e-9);
+  }
+  EXPECT_EQ(runs_of(*dive, 1).size(), 1U);
+  const std::string page = format_report_page(*dive, std::nullopt, {});
+  EXPECT_TRUE(contains(page, "was started 2 times"));
+  EXPECT_TRUE(contains(page, "Trajectory of base_link in odom, run 2 of 2, 1.0 s to "));
 }
 
 TEST_F(ReportFile, WhatCannotBeReadIsSaid) {
@@ -367,7 +427,7 @@ TEST_F(ReportFile, AbsurdMessagesAreCountedAndNeverFatal) {
     ASSERT_TRUE(dive.ok()) << dive.error();
     EXPECT_FALSE(dive->notes.empty());
     const auto map = map_points(*dive, {}, 100);
-    const std::string page = format_report_page(*dive, std::nullopt, map);
+    const std::string page = format_report_page(*dive, std::nullopt, {map});
     EXPECT_FALSE(contains(page, "<script"));
     std::filesystem::remove(path);
   }

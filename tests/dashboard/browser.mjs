@@ -20,15 +20,19 @@ export function chromiumPath() {
   );
 }
 
-export async function launch() {
+/** `gpu`: with a graphics card where there is one; else everything is drawn by the processor. */
+export async function launch({ gpu = false } = {}) {
   const executablePath = chromiumPath();
   if (!executablePath) skip("no chromium here; scripts/install-deps --dev installs it");
   if (!fs.existsSync(path.join(root, "dashboard/node_modules/playwright-core"))) {
     skip("the page's npm packages are not installed; scripts/build fetches them");
   }
   const { chromium } = require("playwright-core");
+  const drawing = gpu
+    ? "--enable-gpu --ignore-gpu-blocklist"
+    : "--disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader";
   const flags =
-    "--no-sandbox --disable-gpu --use-angle=swiftshader --enable-unsafe-swiftshader --disable-quic " +
+    `--no-sandbox ${drawing} --disable-quic ` +
     "--no-first-run --disable-background-networking --disable-component-update --disable-sync";
   return await chromium.launch({ executablePath, headless: true, args: flags.split(" ") });
 }

@@ -42,6 +42,9 @@ const kTypes = {
   keyframe: "sovo_msgs/msg/Keyframe",
   points: "sensor_msgs/msg/PointCloud2",
   calibration: "sovo_msgs/msg/StereoCalibration",
+  "left/preview/compressed": "sensor_msgs/msg/CompressedImage",
+  "right/preview_small/compressed": "sensor_msgs/msg/CompressedImage",
+  tracked_points: "sovo_msgs/msg/TrackedPoints",
   odom: "nav_msgs/msg/Odometry",
 };
 const kMime = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };

@@ -124,7 +124,6 @@ export class Vehicle {
   /** performance.now() of the last status and pose. */
   statusHeard = -Infinity;
   poseHeard = -Infinity;
-  revision = 0;
 
   private readonly ends: (() => void)[] = [];
   private readonly arrivals: number[] = [];
@@ -143,11 +142,9 @@ export class Vehicle {
     this.hear("points", (m: PointCloud2) => this.addPoints(m));
     this.hear("path", (m: Path) => {
       this.path = m;
-      this.revision += 1;
     });
     this.hear("calibration", (m: StereoCalibration) => {
       this.calibration = m;
-      this.revision += 1;
     });
     this.hear("left/preview/compressed", (m: CompressedImage) => void this.left.take(m));
     this.hear("right/preview_small/compressed", (m: CompressedImage) => void this.right.take(m));
@@ -226,7 +223,6 @@ export class Vehicle {
     });
     this.losses = losses;
     if (!follows) this.startAnew();
-    this.revision += 1;
   }
 
   private addPose(m: ScaledOdometry): void {
@@ -252,7 +248,6 @@ export class Vehicle {
     if (last < 0 || time > this.poses.time(last)) {
       this.poses.push(time, m.pose.pose, m.state, m.segment);
     }
-    this.revision += 1;
   }
 
   private addKeyframe(m: Keyframe): void {
@@ -262,7 +257,6 @@ export class Vehicle {
       this.keyframes.delete(this.keyframes.keys().next().value!);
     }
     this.keyframeRevision += 1;
-    this.revision += 1;
   }
 
   private addPoints(m: PointCloud2): void {
@@ -280,7 +274,6 @@ export class Vehicle {
     }
     this.windowPoints = points;
     this.windowRevision += 1;
-    this.revision += 1;
   }
 
   /** Names begin with the namespace: "auv1: camera". */
@@ -299,7 +292,6 @@ export class Vehicle {
         heard: performance.now(),
       });
     }
-    this.revision += 1;
   }
 
   /** The stamps began again: another run of the same recording. */

@@ -52,7 +52,7 @@ export class VoxelMap {
   }
 
   private coarsen(): void {
-    this.size *= 2;
+    this.size *= Math.SQRT2;
     this.voxels.clear();
     let to = 0;
     for (let i = 0; i < this.count; ++i) {

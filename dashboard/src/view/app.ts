@@ -52,6 +52,7 @@ export class App {
   private readonly veil = element("div", { class: "veil" });
   private readonly notices = element("div", { class: "notices", role: "log" });
   private readonly gridText = element("span");
+  private readonly detailText = element("span");
   private readonly scaleBar = element("div", { class: "scale-bar" });
   private readonly scaleText = element("span", { class: "num" });
   private readonly badge = element("span", { class: "badge num" });
@@ -59,7 +60,8 @@ export class App {
   private readonly viewButtons = new Map<ViewName, HTMLButtonElement>();
   private vehicle: Vehicle | undefined;
   private hovered: number | undefined;
-  private slowWork = 0;
+  private updates = 0;
+  private plotted = "";
   private readonly software = isSoftwareRendering();
 
   constructor(url: string) {
@@ -159,7 +161,7 @@ export class App {
       key.style.setProperty("--key", `var(${state.color})`);
       states.append(key);
     }
-    const scale = element("div", { class: "row" }, this.scaleBar, this.scaleText, this.gridText);
+    const scale = element("div", { class: "row" }, this.scaleBar, this.scaleText, this.gridText, this.detailText);
     return element("div", { class: "legend" }, states, scale);
   }
 
@@ -173,6 +175,7 @@ export class App {
     this.timeline.onChange = () => {
       this.hovered = undefined;
     };
+    this.scene.timeShown = () => this.hovered ?? this.timeline.held ?? this.vehicle?.now ?? NaN;
     this.other.onChange = (poses) => this.scene.setOther(poses);
     window.addEventListener("keydown", (e) => this.key(e));
     this.plots.node.addEventListener("pointerleave", () => {
@@ -199,7 +202,7 @@ export class App {
   private choose(ns: string): void {
     if (this.vehicle?.ns === ns) return;
     this.vehicle?.end();
-    this.vehicle = new Vehicle(this.link, ns, this.software ? 50_000 : 250_000);
+    this.vehicle = new Vehicle(this.link, ns, this.software ? 12_000 : 250_000);
     this.scene.setVehicle(this.vehicle);
     this.timeline.hold(undefined);
     this.chooser.value = ns;
@@ -251,17 +254,24 @@ export class App {
     const at = this.hovered ?? held;
     const live = this.timeline.isLive && this.hovered === undefined;
     this.banner.update(this.link, vehicle, at, live);
-    this.plots.update(vehicle, held, at);
+    this.updatePlots(vehicle, held, at);
     this.left.update(vehicle, at, live);
     this.right.update(vehicle, at, live);
     this.large.update(vehicle, at);
     this.health.update(vehicle);
     this.tools.update(vehicle);
-    this.scene.update(at);
     this.showHealthBadge(vehicle);
     this.showScale();
     this.showVeil(vehicle);
-    if (++this.slowWork % 10 === 0) this.other.update(vehicle?.poses);
+    if (++this.updates % 10 === 0) this.other.update(vehicle?.poses);
+  }
+
+  /** Curves are the dearest part of the page: they move on half as often as figures do. */
+  private updatePlots(vehicle: Vehicle | undefined, held: number, at: number): void {
+    const asked = [this.hovered, this.timeline.held, this.plots.span].join();
+    if (this.updates % 2 !== 0 && asked === this.plotted) return;
+    this.plotted = asked;
+    this.plots.update(vehicle, held, at);
   }
 
   private showHealthBadge(vehicle: Vehicle | undefined): void {
@@ -278,6 +288,7 @@ export class App {
     this.scaleBar.style.width = `${length / this.scene.metresPerPixel}px`;
     setText(this.scaleText, length >= 1 ? `${length.toFixed(0)} m` : `${(length * 100).toFixed(0)} cm`);
     setText(this.gridText, this.scene.gridText);
+    setText(this.detailText, this.scene.detailText);
   }
 
   private showVeil(vehicle: Vehicle | undefined): void {

@@ -1,4 +1,5 @@
 import {
+  Box3,
   BufferAttribute,
   BufferGeometry,
   Color,
@@ -23,6 +24,7 @@ import type { Vehicle } from "../model/vehicle";
 import { kStates } from "../model/words";
 import { element, themeColor } from "./dom";
 import { GrowingLine } from "./growing_line";
+import { FramePace } from "./rendering";
 import {
   CameraMarker,
   GroundGrid,
@@ -35,15 +37,21 @@ import {
 export type ViewName = "orbit" | "follow" | "top" | "side";
 export type LayerName = "trajectory" | "map" | "points" | "keyframes" | "grid" | "picture";
 
-const kFrameMs = 1000 / 30;
 /** With many keyframes, their marks are made anew this often at most. */
 const kKeyframesMs = 1000;
+/** Shorter pieces of the trajectory would be drawn in vain [m]. */
+const kLeastPiece = 0.01;
+/** Where the processor draws, pieces are this long at least [px of the page]. */
+const kPiecePixels = 4;
+/** Dots of keyframes that lie nearer are left out where the processor draws [px of the page]. */
+const kDotSpacing = 4;
 
 /** The room that the vehicle moves in. */
 export class SceneView {
   view: ViewName = "orbit";
   ruling = false;
-  framesPerSecond = 0;
+  /** Where the vehicle is shown [s]. */
+  timeShown: () => number = () => NaN;
   onRuler: (on: boolean) => void = () => {};
   readonly canvas = element("canvas", { class: "gl", tabindex: "0", "aria-label": "3D view" });
 
@@ -56,7 +64,7 @@ export class SceneView {
   private readonly line = new GrowingLine(3);
   private readonly pathLine = new GrowingLine(1.5, 0.5);
   private readonly otherLine = new GrowingLine(2, 0.9);
-  private readonly marker = new CameraMarker();
+  private readonly marker: CameraMarker;
   private readonly keyframes: KeyframeMarkers;
   private readonly grid = new GroundGrid();
   private readonly window: Points<BufferGeometry, PointsMaterial>;
@@ -75,27 +83,35 @@ export class SceneView {
   private drawnKeyframeSize = 0;
   private keyframesAt = 0;
   private stateColors: Color[] = [];
-  private drawMs = 0;
-  private lastTick = 0;
-  private drewLast = false;
   private drawnWindow = -1;
   private drawnPath: unknown;
+  private drawnPlace = "";
+  private drawnPicture: unknown;
   private drawnCalibration: unknown;
   private lastPoint = new Vector3();
   private lastSegment = -1;
+  private lastState = -1;
+  private leastPiece = kLeastPiece;
+  private drawnPiece = kLeastPiece;
+  private readonly mostPieces: number;
+  private readonly travelled = new Box3();
+  private readonly travelledBefore = new Box3();
   private touched = false;
   private dirty = true;
-  private lastFrame = 0;
   private readonly followed = new Vector3();
-  private frames: number[] = [];
+  private readonly pace: FramePace;
+  private readonly hidden = new Set<LayerName>();
+  private readonly size = new Vector2(1, 1);
 
   constructor(
     private readonly host: HTMLElement,
-    software: boolean,
+    private readonly software: boolean,
   ) {
     this.renderer = new WebGLRenderer({ canvas: this.canvas, antialias: !software });
-    this.renderer.setPixelRatio(software ? 1 : Math.min(window.devicePixelRatio, 2));
+    this.pace = new FramePace();
     this.keyframes = new KeyframeMarkers(software ? 150 : 1500);
+    this.marker = new CameraMarker(software ? 160 : 1280);
+    this.mostPieces = software ? 20_000 : 240_000;
     host.prepend(this.canvas);
     host.append(this.rulerLabel);
     this.rulerLabel.hidden = true;
@@ -104,6 +120,8 @@ export class SceneView {
       new PointsMaterial({ size: 3, sizeAttenuation: false }),
     );
     this.window.frustumCulled = false;
+    // The map has most of these points too: those of the window are seen.
+    this.window.renderOrder = 1;
     this.plumb = new Line(
       new BufferGeometry(),
       new LineDashedMaterial({ dashSize: 0.1, gapSize: 0.1, transparent: true, opacity: 0.6 }),
@@ -128,13 +146,16 @@ export class SceneView {
 
   setVehicle(vehicle: Vehicle | undefined): void {
     if (this.cloud) this.scene.remove(this.cloud.object);
+    this.cloud?.dispose();
     this.vehicle = vehicle;
-    this.cloud = vehicle ? new MapCloud(vehicle.map) : undefined;
+    this.cloud = vehicle ? new MapCloud(vehicle.map, this.software ? 2 : 1.5) : undefined;
     if (this.cloud) this.scene.add(this.cloud.object);
+    this.showLayers();
+    this.leastPiece = kLeastPiece;
     this.drawnRevision = -1;
     this.drawnKeyframes = -1;
     this.drawnWindow = -1;
-    this.drawnPath = undefined;
+    this.drawnPath = this.drawnPlace = this.drawnPicture = "none";
     this.touched = false;
     this.dirty = true;
   }
@@ -147,13 +168,19 @@ export class SceneView {
   }
 
   setLayer(layer: LayerName, on: boolean): void {
-    if (layer === "trajectory") this.line.object.userData.off = !on;
-    if (layer === "map" && this.cloud) this.cloud.object.visible = on;
-    if (layer === "points") this.window.visible = on;
-    if (layer === "keyframes") this.keyframes.object.visible = on;
-    if (layer === "grid") this.grid.object.visible = on;
-    if (layer === "picture") this.marker.object.userData.noPicture = !on;
-    this.dirty = true;
+    if (on) this.hidden.delete(layer);
+    else this.hidden.add(layer);
+    this.showLayers();
+  }
+
+  get framesPerSecond(): number {
+    return this.pace.framesPerSecond;
+  }
+
+  /** What is left out for want of a fast graphics card; empty: nothing. */
+  get detailText(): string {
+    if (this.software) return "no graphics card: less detail";
+    return this.pace.isCoarse && window.devicePixelRatio > 1 ? "slow graphics: fewer pixels" : "";
   }
 
   get gridText(): string {
@@ -162,7 +189,7 @@ export class SceneView {
 
   /** Metres that one pixel of the page spans at the place looked at. */
   get metresPerPixel(): number {
-    const height = this.host.clientHeight || 1;
+    const height = this.size.y;
     if (this.isPlan) return (this.plan.top - this.plan.bottom) / this.plan.zoom / height;
     const distance = this.eye.position.distanceTo(this.controls.target);
     return (2 * distance * Math.tan((this.eye.fov * Math.PI) / 360)) / height;
@@ -170,7 +197,7 @@ export class SceneView {
 
   setView(view: ViewName): void {
     const target = this.activeControls.target.clone();
-    const span = this.metresPerPixel * this.host.clientHeight;
+    const span = this.metresPerPixel * this.size.y;
     this.view = view;
     this.controls.enabled = !this.isPlan;
     this.planControls.enabled = this.isPlan;
@@ -193,19 +220,8 @@ export class SceneView {
 
   /** Everything that was travelled comes into view. */
   fit(): void {
-    const poses = this.vehicle?.poses;
-    const low = new Vector3(-1, -1, -0.5);
-    const high = new Vector3(1, 1, 0.5);
-    const step = Math.max(1, Math.floor((poses?.length ?? 0) / 2000));
-    for (let i = 0; poses && i < poses.length; i += step) {
-      const p = new Vector3(poses.x(i), poses.y(i), poses.z(i));
-      low.min(p);
-      high.max(p);
-    }
-    for (const { pose } of this.vehicle?.path?.poses ?? []) {
-      low.min(pose.position as Vector3);
-      high.max(pose.position as Vector3);
-    }
+    const all = new Box3(new Vector3(-1, -1, -0.5), new Vector3(1, 1, 0.5));
+    const { min: low, max: high } = all.union(this.travelled).union(this.travelledBefore);
     const centre = low.clone().add(high).multiplyScalar(0.5);
     const radius = Math.max(high.distanceTo(low) / 2, 1);
     const controls = this.activeControls;
@@ -234,7 +250,7 @@ export class SceneView {
     this.cloud?.redraw();
     this.drawnRevision = -1;
     this.drawnOther = -1;
-    this.drawnPath = undefined;
+    this.drawnPath = this.drawnPlace = "none";
     this.dirty = true;
   }
 
@@ -256,17 +272,26 @@ export class SceneView {
     });
   }
 
-  /** Brings the objects up to date; `time` is where the vehicle is shown. */
-  update(time: number): void {
+  /** Brings the objects up to date; what changed wants to be drawn. */
+  private update(): void {
+    this.updateOther();
     const vehicle = this.vehicle;
     if (!vehicle) return;
-    this.updateTrajectory(vehicle);
-    this.updatePath(vehicle);
-    this.updateOther();
-    this.updateMarker(vehicle, time);
+    const moved = this.updateTrajectory(vehicle);
+    const movedBefore = this.updatePath(vehicle);
+    this.updateMarker(vehicle, this.timeShown());
     this.updateKeyframes(vehicle);
     this.updatePoints(vehicle);
-    if (!this.touched && this.view !== "follow") this.fit();
+    if ((moved || movedBefore) && !this.touched && this.view !== "follow") this.fit();
+  }
+
+  private showLayers(): void {
+    const shows = (layer: LayerName) => !this.hidden.has(layer);
+    this.line.object.visible = shows("trajectory") && this.line.length > 0;
+    if (this.cloud) this.cloud.object.visible = shows("map");
+    this.window.visible = shows("points");
+    this.keyframes.object.visible = shows("keyframes");
+    this.grid.object.visible = shows("grid");
     this.dirty = true;
   }
 
@@ -293,7 +318,7 @@ export class SceneView {
   }
 
   private setPlanSpan(height: number): void {
-    const aspect = this.host.clientWidth / Math.max(this.host.clientHeight, 1);
+    const aspect = this.size.x / this.size.y;
     const half = Math.max(height, (height / Math.max(aspect, 0.1)) * 0.9) / 2;
     this.plan.top = half;
     this.plan.bottom = -half;
@@ -320,37 +345,29 @@ export class SceneView {
   private resize(): void {
     const { clientWidth: w, clientHeight: h } = this.host;
     if (w === 0 || h === 0) return;
+    this.size.set(w, h);
     this.renderer.setSize(w, h, false);
     this.eye.aspect = w / h;
     this.eye.updateProjectionMatrix();
     this.setPlanSpan(this.plan.top - this.plan.bottom);
-    const size = new Vector2(w, h);
-    for (const line of [this.line, this.pathLine, this.otherLine]) line.setResolution(size);
+    for (const line of [this.line, this.pathLine, this.otherLine]) line.setResolution(this.size);
     this.dirty = true;
   }
 
   private tick(now: number): void {
     requestAnimationFrame((t) => this.tick(t));
-    const gap = now - this.lastTick;
-    this.lastTick = now;
-    // A slow frame delays the next: that is what drawing costs, whoever does it.
-    if (this.drewLast) this.drawMs = 0.7 * this.drawMs + 0.3 * (gap < 40 ? 4 : Math.min(gap, 2000));
-    this.drewLast = false;
-    // Drawing may take half of the time, so that the page stays at hand.
-    const pause = Math.max(kFrameMs - 4, 2 * this.drawMs);
-    if (!this.dirty || now - this.lastFrame < pause) return;
-    this.lastFrame = now;
-    this.drewLast = true;
+    if (!this.pace.tick(now)) return;
+    this.update();
+    if (!this.dirty) return;
     this.draw();
-    this.frames.push(now);
-    while (this.frames.length > 0 && this.frames[0]! < now - 2000) this.frames.shift();
-    this.framesPerSecond = this.frames.length / 2;
+    this.pace.drew(now);
   }
 
   private draw(): void {
     this.dirty = false;
+    this.applyDetail();
     const controls = this.activeControls;
-    const distance = this.metresPerPixel * this.host.clientHeight;
+    const distance = this.metresPerPixel * this.size.y;
     this.grid.update(controls.target.x, controls.target.y, distance);
     this.marker.setSize(Math.min(Math.max(distance * 0.075, 0.08), 20));
     if (!this.isPlan) {
@@ -362,40 +379,65 @@ export class SceneView {
     this.placeRulerLabel();
   }
 
-  private updateTrajectory(vehicle: Vehicle): void {
+  private applyDetail(): void {
+    const most = this.software || this.pace.isCoarse ? 1 : 2;
+    const pixels = Math.min(window.devicePixelRatio, most);
+    if (pixels !== this.renderer.getPixelRatio()) this.renderer.setPixelRatio(pixels);
+  }
+
+  /** Returns whether there is more of it. */
+  private updateTrajectory(vehicle: Vehicle): boolean {
     const poses = vehicle.poses;
-    if (this.drawnRevision !== poses.revision) {
+    const pixels = this.software ? kPiecePixels * this.metresPerPixel : 0;
+    const piece = Math.max(this.leastPiece, pixels);
+    const resized = piece > 2 * this.drawnPiece || piece < 0.5 * this.drawnPiece;
+    if (this.drawnRevision !== poses.revision || resized) {
+      this.drawnPiece = piece;
       this.line.clear();
+      this.travelled.makeEmpty();
       this.drawnRevision = poses.revision;
       this.drawnPoses = 0;
       this.lastSegment = -1;
+      this.dirty = true;
     }
+    if (this.drawnPoses === poses.length) return false;
     const colors = this.stateColors;
     for (; this.drawnPoses < poses.length; ++this.drawnPoses) {
       const i = this.drawnPoses;
       const p = new Vector3(poses.x(i), poses.y(i), poses.z(i));
+      this.travelled.expandByPoint(p);
       const segment = poses.segment(i);
+      const state = poses.state(i);
       if (segment !== this.lastSegment) {
         this.lastSegment = segment;
+        this.lastState = state;
         this.lastPoint.copy(p);
         continue;
       }
-      // Pieces shorter than a centimetre would be drawn in vain.
-      if (p.distanceToSquared(this.lastPoint) < 1e-4) continue;
+      const least = state === this.lastState ? this.drawnPiece : kLeastPiece;
+      if (p.distanceTo(this.lastPoint) < least) continue;
       const a = this.lastPoint;
-      this.line.push(a.x, a.y, a.z, p.x, p.y, p.z, colors[poses.state(i)] ?? colors[6]!);
+      this.line.push(a.x, a.y, a.z, p.x, p.y, p.z, colors[state] ?? colors[6]!);
+      this.lastState = state;
       this.lastPoint.copy(p);
     }
     this.line.flush();
-    if (this.line.object.userData.off) this.line.object.visible = false;
+    this.showLayers();
+    if (this.line.length > this.mostPieces) {
+      this.leastPiece *= 2;
+      this.drawnRevision = -1;
+    }
+    return true;
   }
 
-  /** What was travelled before this page was opened. */
-  private updatePath(vehicle: Vehicle): void {
-    if (this.drawnPath === vehicle.path) return;
+  /** What was travelled before this page was opened. Returns whether there is news of it. */
+  private updatePath(vehicle: Vehicle): boolean {
+    if (this.drawnPath === vehicle.path) return false;
     this.drawnPath = vehicle.path;
     const poses = vehicle.path?.poses.map((p) => p.pose) ?? [];
+    this.travelledBefore.setFromPoints(poses.map((p) => p.position as Vector3));
     this.drawPoses(this.pathLine, poses, new Color(themeColor("--faint")));
+    return true;
   }
 
   private updateOther(): void {
@@ -406,11 +448,13 @@ export class SceneView {
 
   private drawPoses(line: GrowingLine, poses: Pose[], color: Color): void {
     line.clear();
-    for (let i = 1; i < poses.length; ++i) {
-      const [a, b] = [poses[i - 1]!.position, poses[i]!.position];
+    const step = Math.max(1, Math.ceil(poses.length / this.mostPieces));
+    for (let i = 0; i + 1 < poses.length; i += step) {
+      const [a, b] = [poses[i]!.position, poses[Math.min(i + step, poses.length - 1)]!.position];
       line.push(a.x, a.y, a.z, b.x, b.y, b.z, color);
     }
     line.flush();
+    this.dirty = true;
   }
 
   private updateMarker(vehicle: Vehicle, time: number): void {
@@ -418,9 +462,15 @@ export class SceneView {
       this.drawnCalibration = vehicle.calibration;
       this.marker.setCalibration(vehicle.calibration);
       this.drawnKeyframes = -1;
+      this.dirty = true;
     }
+    this.updatePicture(vehicle, time);
     const i = vehicle.poses.at(time);
-    this.marker.object.visible = i >= 0;
+    const place = `${i < 0 ? "" : vehicle.poses.time(i)} ${this.view}`;
+    if (this.drawnPlace === place) return;
+    this.drawnPlace = place;
+    this.dirty = true;
+    this.marker.object.visible = this.plumb.visible = i >= 0;
     if (i < 0) return;
     const [x, y, z] = [vehicle.poses.x(i), vehicle.poses.y(i), vehicle.poses.z(i)];
     const [qx, qy, qz, qw] = vehicle.poses.orientation(i);
@@ -429,8 +479,6 @@ export class SceneView {
       orientation: { x: qx, y: qy, z: qz, w: qw },
     });
     this.marker.setColor(this.stateColors[vehicle.poses.state(i)] ?? this.stateColors[6]!);
-    const picture = this.marker.object.userData.noPicture ? undefined : vehicle.left.at(time);
-    this.marker.setPicture(picture?.bitmap);
     this.plumb.geometry.setFromPoints([new Vector3(x, y, z), new Vector3(x, y, 0)]);
     this.plumb.computeLineDistances();
     if (this.view === "follow") {
@@ -442,6 +490,14 @@ export class SceneView {
     }
   }
 
+  private updatePicture(vehicle: Vehicle, time: number): void {
+    const bitmap = this.hidden.has("picture") ? undefined : vehicle.left.at(time)?.bitmap;
+    if (this.drawnPicture === bitmap) return;
+    this.drawnPicture = bitmap;
+    this.marker.setPicture(bitmap);
+    this.dirty = true;
+  }
+
   private updateKeyframes(vehicle: Vehicle): void {
     const size = Math.min(Math.max(this.metresPerPixel * 9, 0.02), 5);
     const resized = size > 1.4 * this.drawnKeyframeSize || size < 0.7 * this.drawnKeyframeSize;
@@ -451,16 +507,20 @@ export class SceneView {
     this.keyframesAt = now;
     this.drawnKeyframes = vehicle.keyframeRevision;
     this.drawnKeyframeSize = size;
-    this.keyframes.update(vehicle.keyframes, viewCorners(vehicle.calibration), size);
+    const spacing = this.software ? kDotSpacing * this.metresPerPixel : 0;
+    this.keyframes.update(vehicle.keyframes, viewCorners(vehicle.calibration), size, spacing);
+    this.dirty = true;
   }
 
   private updatePoints(vehicle: Vehicle): void {
-    this.cloud?.update(document.documentElement.dataset.theme === "light");
+    const light = document.documentElement.dataset.theme === "light";
+    if (this.cloud?.update(light)) this.dirty = true;
     if (this.drawnWindow === vehicle.windowRevision) return;
     this.drawnWindow = vehicle.windowRevision;
     this.window.geometry.dispose();
     this.window.geometry = new BufferGeometry();
     this.window.geometry.setAttribute("position", new BufferAttribute(vehicle.windowPoints, 3));
+    this.dirty = true;
   }
 
   private pressed(event: PointerEvent): void {
@@ -509,7 +569,7 @@ export class SceneView {
     const [a, b] = this.rulerPoints as [Vector3, Vector3];
     const middle = a.clone().add(b).multiplyScalar(0.5);
     middle.project(this.isPlan ? this.plan : this.eye);
-    this.rulerLabel.style.left = `${((middle.x + 1) / 2) * this.host.clientWidth}px`;
-    this.rulerLabel.style.top = `${((1 - middle.y) / 2) * this.host.clientHeight}px`;
+    this.rulerLabel.style.left = `${((middle.x + 1) / 2) * this.size.x}px`;
+    this.rulerLabel.style.top = `${((1 - middle.y) / 2) * this.size.y}px`;
   }
 }

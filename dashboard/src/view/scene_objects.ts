@@ -53,9 +53,12 @@ export class CameraMarker {
   private readonly mount = new Group();
   private readonly lines: LineSegments;
   private readonly plane: Mesh<BufferGeometry, MeshBasicMaterial>;
+  private readonly picture = document.createElement("canvas");
+  private texture: Texture | undefined;
   private shown: ImageBitmap | undefined;
 
-  constructor() {
+  /** `mostPictureWidth` [px]: a wider picture is reduced. */
+  constructor(private readonly mostPictureWidth: number) {
     this.lines = new LineSegments(new BufferGeometry(), new LineBasicMaterial());
     this.plane = new Mesh(
       new BufferGeometry(),
@@ -93,16 +96,18 @@ export class CameraMarker {
     if (!bitmap || bitmap === this.shown) return;
     this.shown = bitmap;
     // The feed closes old pictures: the texture keeps a copy.
-    const canvas = document.createElement("canvas");
-    canvas.width = bitmap.width;
-    canvas.height = bitmap.height;
-    canvas.getContext("2d")!.drawImage(bitmap, 0, 0);
-    this.plane.material.map?.dispose();
-    const texture = new Texture(canvas);
-    texture.colorSpace = SRGBColorSpace;
-    texture.needsUpdate = true;
-    this.plane.material.map = texture;
-    this.plane.material.needsUpdate = true;
+    const reduced = Math.min(1, this.mostPictureWidth / bitmap.width);
+    const [width, height] = [bitmap.width, bitmap.height].map((n) => Math.max(1, Math.round(n * reduced)));
+    if (!this.texture || this.picture.width !== width || this.picture.height !== height) {
+      [this.picture.width, this.picture.height] = [width!, height!];
+      this.texture?.dispose();
+      this.texture = new Texture(this.picture);
+      this.texture.colorSpace = SRGBColorSpace;
+      this.plane.material.map = this.texture;
+      this.plane.material.needsUpdate = true;
+    }
+    this.picture.getContext("2d")!.drawImage(bitmap, 0, 0, width!, height!);
+    this.texture.needsUpdate = true;
   }
 
   setSize(size: number): void {
@@ -133,10 +138,14 @@ export class KeyframeMarkers {
     this.dots.material.color.set(color);
   }
 
-  /** `marks`: poses of the left camera, oldest first. */
-  update(marks: Map<string, KeyframeMark>, corners: Vector3[], size: number): void {
+  /**
+   * `marks`: poses of the left camera, oldest first; `spacing`: a dot that lies nearer to the one
+   * before is left out [m].
+   */
+  update(marks: Map<string, KeyframeMark>, corners: Vector3[], size: number, spacing: number): void {
     const numDots = Math.max(0, marks.size - this.mostPyramids);
-    const dots = new Float32Array(3 * numDots);
+    const dots: number[] = [];
+    const last = new Vector3(Infinity, Infinity, Infinity);
     const lines = new Float32Array(48 * (marks.size - numDots));
     const q = new Quaternion();
     const p = new Vector3();
@@ -144,10 +153,11 @@ export class KeyframeMarkers {
     let [i, at] = [0, 0];
     for (const { pose } of marks.values()) {
       const { x, y, z } = pose.position;
-      if (i < numDots) dots.set([x, y, z], 3 * i);
-      i += 1;
-      if (i <= numDots) continue;
       p.set(x, y, z);
+      if (i++ < numDots) {
+        if (!(p.distanceTo(last) < spacing)) dots.push(...last.copy(p).toArray());
+        continue;
+      }
       q.copy(pose.orientation as Quaternion);
       corners.forEach((corner, k) => {
         c[k]!.copy(corner).multiplyScalar(size).applyQuaternion(q).add(p);
@@ -158,7 +168,7 @@ export class KeyframeMarkers {
         at += 12;
       }
     }
-    setPositions(this.dots, dots);
+    setPositions(this.dots, new Float32Array(dots));
     setPositions(this.pyramids, lines);
   }
 }
@@ -169,53 +179,71 @@ function setPositions(object: { geometry: BufferGeometry }, positions: Float32Ar
   object.geometry.setAttribute("position", new BufferAttribute(positions, 3));
 }
 
+/** Linear colours of the map's points by their grey level; `light`: bright points must darken. */
+function mapTones(light: boolean): Uint8Array {
+  const tones = new Uint8Array(4 * 256);
+  for (let grey = 0; grey < 256; ++grey) {
+    const tone = light ? 70 + grey * 0.45 : 48 + grey * 0.5;
+    tones.set([tone * 0.93, tone * 0.98, Math.min(255, tone * 1.04), 255], 4 * grey);
+  }
+  return tones;
+}
+
 /** The accumulated map, in the grey levels of the pictures. */
 export class MapCloud {
   readonly object: Points<BufferGeometry, PointsMaterial>;
   private uploaded = 0;
   private revision = -1;
 
-  constructor(private readonly map: VoxelMap) {
+  /** `size`: of a point [px of the page]. */
+  constructor(
+    private readonly map: VoxelMap,
+    size: number,
+  ) {
     const geometry = new BufferGeometry();
     const positions = new BufferAttribute(map.positions, 3);
-    positions.setUsage(DynamicDrawUsage);
-    const colors = new BufferAttribute(new Uint8Array(3 * map.intensities.length), 3, true);
-    colors.setUsage(DynamicDrawUsage);
-    geometry.setAttribute("position", positions);
-    geometry.setAttribute("color", colors);
+    const colors = new BufferAttribute(new Uint8Array(4 * map.intensities.length), 4, true);
+    geometry.setAttribute("position", positions.setUsage(DynamicDrawUsage));
+    geometry.setAttribute("color", colors.setUsage(DynamicDrawUsage));
     geometry.setDrawRange(0, 0);
-    const material = new PointsMaterial({ size: 1.5, sizeAttenuation: false, vertexColors: true });
+    const material = new PointsMaterial({ size, sizeAttenuation: false, vertexColors: true });
     this.object = new Points(geometry, material);
     this.object.frustumCulled = false;
   }
 
-  /** `light`: the page is light, so that bright points must darken. */
-  update(light: boolean): void {
+  /** Takes in what is new; returns whether anything is. */
+  update(light: boolean): boolean {
     if (this.revision !== this.map.revision) {
       this.revision = this.map.revision;
       this.uploaded = 0;
     }
     const geometry = this.object.geometry;
+    if (this.uploaded === this.map.count && geometry.drawRange.count === this.map.count) return false;
     geometry.setDrawRange(0, this.map.count);
-    if (this.uploaded >= this.map.count) return;
+    // What can be clicked has grown.
+    geometry.boundingSphere = null;
     const colors = geometry.getAttribute("color") as BufferAttribute;
+    const tones = mapTones(light);
     for (let i = this.uploaded; i < this.map.count; ++i) {
-      const grey = this.map.intensities[i]!;
-      const tone = light ? 70 + grey * 0.45 : 48 + grey * 0.5;
-      colors.array[3 * i] = tone * 0.93;
-      colors.array[3 * i + 1] = tone * 0.98;
-      colors.array[3 * i + 2] = Math.min(255, tone * 1.04);
+      const at = 4 * this.map.intensities[i]!;
+      colors.array.set(tones.subarray(at, at + 4), 4 * i);
     }
     const positions = geometry.getAttribute("position") as BufferAttribute;
-    for (const attribute of [positions, colors]) {
-      attribute.addUpdateRange(3 * this.uploaded, 3 * (this.map.count - this.uploaded));
-      attribute.needsUpdate = true;
-    }
+    const added = this.map.count - this.uploaded;
+    positions.addUpdateRange(3 * this.uploaded, 3 * added);
+    colors.addUpdateRange(4 * this.uploaded, 4 * added);
+    positions.needsUpdate = colors.needsUpdate = added > 0;
     this.uploaded = this.map.count;
+    return true;
   }
 
   redraw(): void {
     this.uploaded = 0;
+  }
+
+  dispose(): void {
+    this.object.geometry.dispose();
+    this.object.material.dispose();
   }
 }
 
@@ -248,11 +276,15 @@ export class GroundGrid {
     this.key = key;
     const [fine, strong]: [number[], number[]] = [[], []];
     const n = 40;
-    const reach = n * this.step;
+    // In pieces: a renderer may lose a whole line that passes behind the eye.
+    const piece = 8;
     for (let i = -n; i <= n; ++i) {
       const out = i % 5 === 0 ? strong : fine;
       const [gx, gy] = [cx + i * this.step, cy + i * this.step];
-      out.push(gx, cy - reach, 0, gx, cy + reach, 0, cx - reach, gy, 0, cx + reach, gy, 0);
+      for (let k = -n; k < n; k += piece) {
+        const [from, to] = [k * this.step, (k + piece) * this.step];
+        out.push(gx, cy + from, 0, gx, cy + to, 0, cx + from, gy, 0, cx + to, gy, 0);
+      }
     }
     setPositions(this.fine, new Float32Array(fine));
     setPositions(this.strong, new Float32Array(strong));

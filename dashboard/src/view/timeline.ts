@@ -18,6 +18,7 @@ export class Timeline {
   private readonly pause: HTMLButtonElement;
   private newest = NaN;
   private first = NaN;
+  private drawn = "";
 
   constructor() {
     this.pause = button("Pause", "Hold the page (space)", () => this.toggle());
@@ -83,6 +84,11 @@ export class Timeline {
       this.canvas.width = width;
       this.canvas.height = height;
     }
+    // A ribbon of minutes hardly moves in a tenth of a second.
+    const theme = document.documentElement.dataset.theme;
+    const key = [width, height, theme, this.held, Math.floor(2 * this.newest), Math.floor(2 * this.first)].join();
+    if (key === this.drawn) return;
+    this.drawn = key;
     const context = this.canvas.getContext("2d")!;
     context.clearRect(0, 0, width, height);
     const top = Math.round(height * 0.3);

@@ -20,6 +20,7 @@ struct DivePose {
   SE3 T_odom_base;
   double speed = 0.0;      ///< Of the base frame [m/s].
   std::uint8_t state = 0;  ///< As VoStatus.
+  std::uint32_t run = 0;   ///< Of the odometry: each has an `odom` of its own.
   std::uint32_t segment = 0;
   std::uint32_t keyframe_id = 0;
   bool metric = false;     ///< Whether its scale was known.
@@ -29,8 +30,7 @@ struct DivePose {
   bool scale_accepted = false;  ///< Verdict on the last measurement.
 };
 
-/// Whether `now` is of another map than `before`: of another segment, or of an odometry that began
-/// anew and counts its segments and keyframes from zero.
+/// Whether `now` is of another map than `before`: of another segment or run.
 bool is_other_map(const DivePose& before, const DivePose& now);
 
 /// Whether the way goes on from `before` to `now`: in one map, and within a second.
@@ -39,6 +39,8 @@ bool goes_on(const DivePose& before, const DivePose& now);
 /// What the odometry said about a frame.
 struct DiveStatus {
   std::uint64_t log_ns = 0;
+  std::int64_t stamp_ns = 0;  ///< Of its frame.
+  std::uint32_t run = 0;
   std::uint8_t state = 0;    ///< As VoStatus.
   std::uint32_t reason = 0;  ///< Index in `Dive::reasons`.
   std::uint64_t session = 0;
@@ -61,6 +63,9 @@ struct DiveComplaint {
 
 /// A keyframe as it was written last.
 struct DiveKeyframe {
+  std::uint64_t log_ns = 0;   ///< When it was recorded first.
+  std::int64_t stamp_ns = 0;  ///< Of its frame.
+  std::uint32_t run = 0;
   SE3 T_odom_left;
   bool metric = false;
   std::vector<float> u, v, inverse_depth, sigma;
@@ -83,7 +88,7 @@ struct Dive {
   std::vector<DiveStatus> statuses;
   std::vector<std::string> reasons;
   std::vector<DiveComplaint> complaints;  ///< Not those of the odometry, which `statuses` has.
-  std::map<std::pair<std::uint32_t, std::uint32_t>, DiveKeyframe> keyframes;  ///< (segment, id)
+  std::vector<DiveKeyframe> keyframes;
   std::map<std::string, std::vector<double>> stages;  ///< Times [ms] by name, each run once.
   std::optional<StereoCameras> cameras;
   std::vector<DiveTopic> topics;

@@ -1,5 +1,9 @@
 #include "sovo/app/report/dive_evaluation.h"
 
+#include <string>
+
+#include "sovo/app/report/dive_runs.h"
+
 namespace sovo::app {
 namespace {
 
@@ -17,8 +21,10 @@ Trajectory left_trajectory(const Dive& dive, const SE3& T_base_left) {
 
 }  // namespace
 
-Result<DiveEvaluation> evaluate_dive(const Dive& dive, const EvaluationFiles& files,
+Result<DiveEvaluation> evaluate_dive(const Dive& whole, const EvaluationFiles& files,
                                      const EvaluationOptions& options) {
+  const std::vector<Dive> longest = runs_of(whole, 1);
+  const Dive& dive = longest.empty() ? whole : longest.front();
   const SE3 T_base_left = dive.cameras ? dive.cameras->rig.T_base_left : SE3();
   auto input = read_evaluation_input(files, left_trajectory(dive, T_base_left));
   if (!input) return input.failure();
@@ -26,9 +32,15 @@ Result<DiveEvaluation> evaluate_dive(const Dive& dive, const EvaluationFiles& fi
     input->notes.emplace_back(
         "no calibration was recorded: the base frame is compared as if it were the left camera");
   }
+  const std::uint32_t run = dive.poses.empty() ? 0 : dive.poses.front().run;
+  if (const std::size_t runs = count_runs(whole); runs > 1) {
+    input->notes.push_back("the odometry was started " + std::to_string(runs) +
+                           " times, each with an odom of its own: run " + std::to_string(run + 1) +
+                           " is compared, which has the most poses");
+  }
   auto report = evaluate(*input, options);
   if (!report) return Error{files.truth + ": " + report.error()};
-  DiveEvaluation result{std::move(*report), {}};
+  DiveEvaluation result{std::move(*report), {}, run};
   const Sim3 S_estimate_truth = result.report.rigid.S_truth_estimate.inverse();
   for (const SE3& pose : result.report.truth) {
     const SE3 T_truth_base = pose * T_base_left.inverse();

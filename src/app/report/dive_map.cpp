@@ -47,7 +47,7 @@ std::vector<Vec3> map_points(const Dive& dive, const StereoOdometryConfig& confi
   if (!dive.cameras || config.downscale < 1) return points;
   const CameraModel camera =
       optimal_pinhole(dive.cameras->rig.left.downscaled(config.downscale), config.undistortion);
-  for (const auto& [id, keyframe] : dive.keyframes) {
+  for (const DiveKeyframe& keyframe : dive.keyframes) {
     if (keyframe.metric) add_points(keyframe, camera, &points);
   }
   for (double cell = 0.01; points.size() > most; cell *= 1.4) points = thinned(points, cell);

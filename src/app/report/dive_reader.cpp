@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <tuple>
 
 #include "sovo/app/report/dive.h"
+#include "sovo/app/report/dive_runs.h"
 #include "sovo/bridge/calibration_conversion.h"
 #include "sovo/bridge/cdr_codec.h"
 #include "sovo/bridge/ros_conversion.h"
@@ -89,6 +91,7 @@ class DiveReader {
 
   /// Ends what was open, and notes what could not be read.
   void finish() {
+    number_runs(&dive_);
     for (auto& [name, complaint] : open_) close(std::move(complaint));
     std::stable_sort(dive_.complaints.begin(), dive_.complaints.end(),
                      [](const auto& a, const auto& b) { return a.begin_ns < b.begin_ns; });
@@ -119,6 +122,7 @@ class DiveReader {
   Result<void> add(std::uint64_t log_ns, const msg::VoStatus& m) {
     DiveStatus s;
     s.log_ns = log_ns;
+    s.stamp_ns = bridge::stamp_ns(m.header.stamp);
     s.state = m.state;
     s.reason = reason_index(shortened(m.reason));
     s.session = m.session;
@@ -131,6 +135,8 @@ class DiveReader {
     s.latency_s = m.latency_s;
     s.sync_error_s = m.sync_error_s;
     s.distance_m = finite_or_zero(m.distance_m);
+    const bool begins_anew = !dive_.statuses.empty() && s.received < dive_.statuses.back().received;
+    restarts_ += begins_anew ? 1 : 0;
     dive_.statuses.push_back(s);
     for (std::uint32_t i = 0; i < m.stages._length; ++i) add_stage(m.stages._buffer[i]);
     return {};
@@ -177,7 +183,7 @@ class DiveReader {
     return {};
   }
 
-  Result<void> add(std::uint64_t /*log_ns*/, const msg::Keyframe& m) {
+  Result<void> add(std::uint64_t log_ns, const msg::Keyframe& m) {
     const std::uint32_t count = m.u._length;
     if (m.v._length != count || m.inverse_depth._length != count || m.sigma._length != count) {
       return Error{"their lists differ in length"};
@@ -185,7 +191,7 @@ class DiveReader {
     if (!bridge::is_rigid(m.pose.position, m.pose.orientation)) {
       return Error{"their pose is not finite, or its quaternion is not of length 1"};
     }
-    DiveKeyframe& k = dive_.keyframes[{m.segment, m.id}];
+    DiveKeyframe& k = keyframe_of(m, log_ns);
     k.T_odom_left = bridge::to_se3(m.pose.position, m.pose.orientation);
     k.metric = std::isfinite(m.log_scale);
     k.u = to_vector(m.u);
@@ -193,6 +199,20 @@ class DiveReader {
     k.inverse_depth = to_vector(m.inverse_depth);
     k.sigma = to_vector(m.sigma);
     return {};
+  }
+
+  /// The same keyframe again has the same frame; an odometry that was started again gives numbers
+  /// that were given before to other frames, or to the same ones of a recording played again.
+  DiveKeyframe& keyframe_of(const msg::Keyframe& m, std::uint64_t log_ns) {
+    const std::int64_t stamp = bridge::stamp_ns(m.header.stamp);
+    const auto key = std::make_tuple(m.segment, m.id, stamp, restarts_);
+    const auto [at, is_new] = keyframe_indices_.emplace(key, dive_.keyframes.size());
+    if (is_new) {
+      dive_.keyframes.emplace_back();
+      dive_.keyframes.back().log_ns = log_ns;
+      dive_.keyframes.back().stamp_ns = stamp;
+    }
+    return dive_.keyframes[at->second];
   }
 
   Result<void> add(std::uint64_t /*log_ns*/, const msg::StereoCalibration& m) {
@@ -243,6 +263,9 @@ class DiveReader {
   std::map<std::string, std::pair<float, float>> last_stage_;
   std::map<std::string, DiveComplaint> open_;
   std::map<std::string, Refused> refused_;
+  std::map<std::tuple<std::uint32_t, std::uint32_t, std::int64_t, std::uint32_t>, std::size_t>
+      keyframe_indices_;
+  std::uint32_t restarts_ = 0;
 };
 
 void add_topics(const Recording& recording, Dive* dive) {
@@ -262,7 +285,7 @@ void add_topics(const Recording& recording, Dive* dive) {
 }  // namespace
 
 bool is_other_map(const DivePose& before, const DivePose& now) {
-  return before.segment != now.segment || now.keyframe_id < before.keyframe_id;
+  return before.run != now.run || before.segment != now.segment;
 }
 
 bool goes_on(const DivePose& before, const DivePose& now) {

@@ -2,10 +2,12 @@
 
 #include <openssl/evp.h>
 
+#include <algorithm>
 #include <array>
 #include <ctime>
 #include <numbers>
 
+#include "sovo/app/report/dive_runs.h"
 #include "sovo/app/report/dive_summary.h"
 #include "sovo/app/report/health_timeline.h"
 #include "sovo/app/report/html.h"
@@ -20,6 +22,7 @@ constexpr double kChartWidth = 580.0;  // [px], of the drawing; the page scales 
 constexpr double kChartHeight = 270.0;
 constexpr double kMapHeight = 480.0;
 constexpr std::size_t kMostRows = 500;
+constexpr std::size_t kMostRuns = 5;
 
 /// How a policy names a style: base64 of its SHA-256.
 std::string style_hash(const std::string& style) {
@@ -94,24 +97,44 @@ std::string format_tiles(const DiveSummary& s, const std::vector<HealthPeriod>& 
 
 std::string figure(const std::string& svg) { return "<figure>" + svg + "</figure>\n"; }
 
-std::string format_trajectory(const Dive& dive, const std::vector<Vec3>& truth,
-                              const DiveSummary& summary) {
-  if (summary.metric_poses == 0) {
+/// ", run 2 of 3" where there are several.
+std::string run_name(const Dive& run, std::size_t runs) {
+  if (runs <= 1 || run.poses.empty()) return "";
+  const auto seconds = [&](const DivePose& pose) {
+    return format_fixed(run.seconds(pose.log_ns), 1) + " s";
+  };
+  return ", run " + std::to_string(run.poses.front().run + 1) + " of " + std::to_string(runs) +
+         ", " + seconds(run.poses.front()) + " to " + seconds(run.poses.back());
+}
+
+std::string format_runs(std::size_t runs, std::size_t shown) {
+  if (runs <= 1) return "";
+  return "<p id=\"runs\">The odometry was started " + std::to_string(runs) +
+         " times. Each run has an odom of its own, so each is drawn by itself" +
+         (shown < runs ? "; those " + std::to_string(shown) + " with the most poses are" : "") +
+         ".</p>\n";
+}
+
+std::string format_trajectory(const Dive& dive, const std::vector<Vec3>& truth, std::size_t runs) {
+  const bool any = std::any_of(dive.poses.begin(), dive.poses.end(),
+                               [](const DivePose& pose) { return pose.metric; });
+  if (!any) {
     return "<h2>Trajectory</h2>\n<p>No pose with a known scale was recorded.</p>\n";
   }
-  return "<h2>Trajectory of base_link in odom</h2>\n<div class=\"charts\">" +
+  return "<h2>Trajectory of base_link in odom" + run_name(dive, runs) +
+         "</h2>\n<div class=\"charts\">" +
          figure(format_chart(chart_from_above(dive, truth), kChartWidth, kMapHeight)) +
          figure(format_chart(chart_from_side(dive, truth), kChartWidth, kMapHeight)) + "</div>\n";
 }
 
-std::string format_map(const Dive& dive, const std::vector<Vec3>& map) {
+std::string format_map(const Dive& dive, const std::vector<Vec3>& map, std::size_t runs) {
   if (map.empty()) {
     return std::string("<h2>Map</h2>\n<p>No map: ") +
            (dive.cameras ? "no keyframe with points was recorded."
                          : "the calibration was not recorded.") +
            "</p>\n";
   }
-  return "<h2>Map</h2>\n" +
+  return "<h2>Map" + run_name(dive, runs) + "</h2>\n" +
          figure(format_chart(chart_of_map(dive, map), 2.0 * kChartWidth, 1.4 * kMapHeight)) +
          "<p>" + std::to_string(map.size()) + " points of " +
          std::to_string(dive.keyframes.size()) + " keyframes.</p>\n";
@@ -260,16 +283,30 @@ std::string format_recording(const Dive& dive) {
 
 }  // namespace
 
+std::vector<Dive> shown_runs(const Dive& dive) { return runs_of(dive, kMostRuns); }
+
 std::string format_report_page(const Dive& dive, const std::optional<DiveEvaluation>& evaluation,
-                               const std::vector<Vec3>& map) {
+                               const std::vector<std::vector<Vec3>>& maps) {
   const DiveSummary summary = summarize(dive);
   const auto periods = health_timeline(dive);
-  const std::vector<Vec3> no_truth;
+  const std::vector<Vec3> nothing;
+  const std::size_t num_runs = count_runs(dive);
+  std::vector<Dive> runs = shown_runs(dive);
+  if (runs.empty()) runs.push_back(dive);
   std::string page = format_head(dive) + format_tiles(summary, periods);
-  page += format_trajectory(dive, evaluation ? evaluation->truth : no_truth, summary);
+  page += format_runs(num_runs, runs.size());
+  for (const Dive& run : runs) {
+    const bool is_compared =
+        evaluation && !run.poses.empty() && run.poses.front().run == evaluation->run;
+    page += format_trajectory(run, is_compared ? evaluation->truth : nothing, num_runs);
+  }
   if (evaluation) page += format_evaluation(evaluation->report);
   page += format_health(dive, periods) + format_complaints(dive);
-  page += format_series(dive, summary) + format_map(dive, map) + format_stages(summary);
+  page += format_series(dive, summary);
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    page += format_map(runs[i], i < maps.size() ? maps[i] : nothing, num_runs);
+  }
+  page += format_stages(summary);
   return page + format_recording(dive) + "</body></html>\n";
 }
 

@@ -60,9 +60,9 @@ struct KeyframeConfig {
 
 /// Immature points: selection, epipolar tracing, activation.
 struct PointConfig {
-  int active_points = 2000;    ///< In the window.
+  int active_points = 2000;   ///< In the window.
   int immature_points = 700;  ///< Selected a keyframe.
-  double max_search = 0.027;   ///< Of width + height: longest epipolar search.
+  double max_search = 0.027;  ///< Of width + height: longest epipolar search.
   double huber = 9.0;
   double outlier_energy = 144.0;  ///< A pixel of the pattern; grey levels squared.
   double min_quality = 3.0;       ///< Second-best over best energy of the search, to be activated.

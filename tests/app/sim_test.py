@@ -104,7 +104,8 @@ class SimulatedExport(SimTest):
         self.assertEqual(len(truth), FRAMES)
         self.expect(sovo("run", "--deterministic", "--dataset", folder, "--out", out), OK)
         self.expect(sovo("run", "--deterministic", *world, "--out", again), OK)
-        self.assertLess(largest_error(read_tum(out), read_tum(again), read_tum(out)[0][0]), 1e-6)
+        # The calibration's last bit, which its text does not keep, may turn a choice between pixels.
+        self.assertLess(largest_error(read_tum(out), read_tum(again), read_tum(out)[0][0]), 2e-4)
         report = self.expect(sovo("eval", "--gt", folder / "groundtruth_cam0_tum.txt",
                                   "--est", out), OK)
         self.assertIn("Completion 100.00 %", report.stdout)

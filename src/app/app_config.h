@@ -21,10 +21,11 @@ enum class Preset {
   kQuality,   ///< The same with more iterations of bundle adjustment.
 };
 
-/// Which implementation of the inner loops runs.
+/// What the inner loops must compute. There is one answer: whatever registers they use, they give
+/// the bits of scalar code.
 enum class Kernels {
-  kAuto,    ///< The best one that this machine has.
-  kScalar,  ///< Plain C++.
+  kAuto,    ///< By the widest registers that this machine has.
+  kScalar,  ///< The bits of scalar code, which is the same.
 };
 
 constexpr std::array<std::pair<Preset, const char*>, 3> enum_names(Preset) {
@@ -168,7 +169,7 @@ struct AppConfig {
   template <class Visitor>
   void visit(Visitor& v) {
     v("preset", preset, "values to begin with, before this file's");
-    v("kernels", kernels, "implementation of the inner loops");
+    v("kernels", kernels, "inner loops; both give the bits of scalar code at the same speed");
     odometry.visit(v);
     v("camera", camera, "source of frames");
     v("sim", sim, "simulated cameras");

@@ -140,7 +140,8 @@ void add_odometry_options(ConfigOptions& options) {
       .value("--depth-init", "depth_init", "A new point's first depth interval", "temporal|stereo")
       .value("--threads", "threads", "Of the loops inside the stages", "N")
       .value("--seed", "seed", "Of every random choice", "N")
-      .value("--kernels", "kernels", "Implementation of the inner loops", "auto|scalar")
+      .value("--kernels", "kernels", "Inner loops; both give the same bits at the same speed",
+             "auto|scalar")
       .flag("--deterministic", "deterministic", "All stages in order: same input, same bytes")
       .value("--out", "output.trajectory", "Write the refined trajectory (TUM)", "FILE")
       .value("--out-live", "output.live_trajectory", "Write the poses as published (TUM)", "FILE")

@@ -12,6 +12,12 @@
 
 #include "sovo/image/image.h"
 
+// Wide registers are passed in another way where the processor has them: nothing here is called.
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wpsabi"
+#endif
+
 namespace sovo {
 
 /// Lanes: floats that the compiler keeps in one register, four (SSE, NEON) or eight (AVX2): GCC's
@@ -365,3 +371,7 @@ SOVO_LANE_FUNCTION BasicLaneSample<F> sample_lanes_with_gradient(const ImageF& i
 }
 
 }  // namespace sovo
+
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC diagnostic pop
+#endif

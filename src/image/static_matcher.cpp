@@ -161,18 +161,20 @@ std::optional<Found> search_range(const PatchSearch& search, const VisibleRange&
   return Found{*winner, level};
 }
 
-/// Whether nothing in the range correlates better than what is near `expected`.
-bool is_best_of_range(const PatchSearch& search, const Range& range, double expected, int level,
-                      CorrelationProfile* profile) {
+/// The best of the range at a level, when that is near `expected`; `expected` itself where the
+/// patch does not fit into the image at this level.
+std::optional<double> best_near(const PatchSearch& search, const Range& range, double expected,
+                                int level, CorrelationProfile* profile) {
   const auto visible = clip_to_image(search.curve, range);
   const auto point = search.curve.at(expected);
-  if (!visible || !point) return false;
-  if (!correlate(search, level, visible->range.min, visible->range.max, profile)) return true;
+  if (!visible || !point) return std::nullopt;
+  if (!correlate(search, level, visible->range.min, visible->range.max, profile)) return expected;
   const int best = profile->best();
-  if (best < 0) return false;
+  if (best < 0) return std::nullopt;
   const double off = std::abs(static_cast<double>(profile->rho[best]) - expected) *
                      point->derivative.norm() / (1 << level);
-  return off <= kModeDistance;
+  if (off > kModeDistance) return std::nullopt;
+  return static_cast<double>(profile->refined_rho(best));
 }
 
 /// Whether the right pixel, looked for in the left image over the same range, leads back.
@@ -186,12 +188,13 @@ bool leads_back(const PatchSearch& forward, const StereoRig& rig, const Range& r
   const double expected = inverse_distance(search->curve, rho);
   const auto point = search->curve.at(expected);
   if (!point) return false;
-  if (!is_best_of_range(*search, back, expected, level, profile)) return false;
-  const double reach = 3.0 / point->derivative.norm();
-  if (!correlate(*search, 0, expected - reach, expected + reach, profile)) return false;
-  const int best = profile->best();
-  if (best < 0) return false;
-  const auto aligned = align(*search, static_cast<double>(profile->refined_rho(best)), false);
+  auto found = best_near(*search, back, expected, level, profile);
+  if (found && level > 0) {
+    const double reach = 3.0 / point->derivative.norm();
+    found = best_near(*search, {expected - reach, expected + reach}, expected, 0, profile);
+  }
+  if (!found) return false;
+  const auto aligned = align(*search, *found, false);
   return aligned && (aligned->pixel - forward.pixel).norm() <= max_error_px;
 }
 

@@ -119,6 +119,7 @@ void PixelSelector::select(const ImagePyramid& pyramid, const ImageU8* mask, int
   if (wanted <= 0 || image.width() < least || image.height() < least) return;
   masked_ = mask != nullptr && !mask->empty();
   if (masked_) erode_mask(*mask);
+  allowed_row_.assign(static_cast<std::size_t>(image.width()), 1.0F);
   compute_thresholds(image);
 
   for (int attempt = 0; attempt < 2; ++attempt) {
@@ -168,9 +169,15 @@ void PixelSelector::compute_thresholds(const ImageF& image) {
 }
 
 /// `allowed_`: the minimum of the mask over a square of side 2 mask_border + 1, rows first.
+/// Masks hardly ever change: the last one's is kept.
 void PixelSelector::erode_mask(const ImageU8& mask) {
   const int w = mask.width();
   const int h = mask.height();
+  if (mask_.width() == w && mask_.height() == h &&
+      std::equal(mask.data(), mask.data() + mask.size(), mask_.data())) {
+    return;
+  }
+  mask_ = mask;
   const int r = std::max(0, config_.mask_border);
   erosion_rows_.resize(w, h);
   allowed_.resize(w, h);
@@ -268,7 +275,6 @@ void PixelSelector::fill_directions(int width) {
   direction_y_.resize(size);
   best_score_.assign(size, 0.0F);
   best_y_.assign(size, 0);
-  allowed_row_.resize(size, 1.0F);
   for (int x0 = 0; x0 < width; x0 += block_) {
     const std::size_t k = random() % kNumDirections;
     const int x1 = std::min(width, x0 + block_);

@@ -90,7 +90,7 @@ class PixelSelector {
   AlignedVector<float> allowed_row_;                                // per column, 1 or 0
   AlignedVector<float> best_score_;  // per column, the best over a row of blocks
   AlignedVector<std::int32_t> best_y_;
-  ImageU8 allowed_, erosion_rows_;
+  ImageU8 mask_, allowed_, erosion_rows_;  // allowed_: mask_ eroded
   bool masked_ = false;
 };
 

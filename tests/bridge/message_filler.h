@@ -18,7 +18,7 @@ class MessageFiller {
   template <class T>
   void fill(T& value) {
     if constexpr (IsMessage<T>) {
-      MessageTraits<T>::visit(value, [this](const char*, auto& field) { fill(field); });
+      MessageTraits<T>::visit(value, [&](const char*, auto& field) { fill(field); });
     } else if constexpr (IsSequence<T>) {
       fill_sequence(value);
     } else if constexpr (std::is_array_v<T>) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <set>
@@ -129,6 +130,29 @@ TEST(PixelSelector, MaskKeepsItsDistance) {
       for (int dx = -3; dx <= 3; ++dx) EXPECT_FALSE(masked(p.x + dx, p.y + dy));
     }
   }
+}
+
+TEST(PixelSelector, AMaskHoldsForItsCallAlone) {
+  const ImagePyramid pyramid = plain_pyramid(textured(641, 479));
+  const auto half = [](bool left) {
+    ImageU8 mask(641, 479);
+    for (int y = 0; y < 479; ++y) {
+      for (int x = 0; x < 641; ++x) mask.at(x, y) = (x < 320) == left ? 255 : 0;
+    }
+    return mask;
+  };
+  const ImageU8 left = half(true);
+  const ImageU8 right = half(false);
+  const auto share_on_left = [](const std::vector<SelectedPixel>& pixels) {
+    const auto n = std::count_if(pixels.begin(), pixels.end(),
+                                 [](const SelectedPixel& p) { return p.x < 320; });
+    return static_cast<double>(n) / static_cast<double>(pixels.size());
+  };
+  PixelSelector selector;
+  EXPECT_EQ(share_on_left(select(&selector, pyramid, 1000, &left)), 1.0);
+  EXPECT_EQ(share_on_left(select(&selector, pyramid, 1000, &left)), 1.0);
+  EXPECT_EQ(share_on_left(select(&selector, pyramid, 1000, &right)), 0.0);
+  EXPECT_NEAR(share_on_left(select(&selector, pyramid, 1000)), 0.5, 0.1);
 }
 
 TEST(PixelSelector, WeakTextureGivesFewPixelsAndNoneWithoutAny) {

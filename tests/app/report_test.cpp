@@ -69,11 +69,12 @@ TEST(ReportHtml, TextStaysText) {
   EXPECT_EQ(escape_html("m\xC3\xBC\xE2\x82\xAC"), "m\xC3\xBC\xE2\x82\xAC");
   const std::string lost = "\xEF\xBF\xBD";
   EXPECT_EQ(escape_html("a\x01z"), "a" + lost + "z");
-  EXPECT_EQ(escape_html("a\x80z"), "a" + lost + "z");                 // no beginning
-  EXPECT_EQ(escape_html("\xC0\xBC"), lost + lost);                    // '<' in too many bytes
-  EXPECT_EQ(escape_html("\xED\xA0\x80"), lost + lost + lost);         // half a surrogate pair
-  EXPECT_EQ(escape_html("a\xE2\x82"), "a" + lost + lost);             // cut
-  EXPECT_EQ(escape_html("\xE2\x80\xAEz"), lost + lost + lost + "z");  // turns the writing round
+  EXPECT_EQ(escape_html("a\x80z"), "a" + lost + "z");          // no beginning
+  EXPECT_EQ(escape_html("\xC0\xBC"), lost + lost);             // '<' in too many bytes
+  EXPECT_EQ(escape_html("\xED\xA0\x80"), lost + lost + lost);  // half a surrogate pair
+  EXPECT_EQ(escape_html("a\xE2\x82"), "a" + lost + lost);      // cut
+  const std::string turns_the_writing_round = std::string("\xE2\x80") + "\xAE";
+  EXPECT_EQ(escape_html(turns_the_writing_round + "z"), lost + lost + lost + "z");
 }
 
 TEST(HealthTimeline, ListsStatesReasonsAndSilence) {

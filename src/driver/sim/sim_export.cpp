@@ -66,8 +66,9 @@ class CameraFiles {
   Result<void> add(const SideImage& side, std::int64_t stamp_ns) {
     const std::string name = std::to_string(stamp_ns);
     csv_ += name + "," + name + ".png\n";
-    times_ += name + " " + format_ns_as_seconds(stamp_ns) + " " +
-              format_float(1e3F * side.exposure_s) + "\n";
+    // As many digits as bring the same float back from milliseconds.
+    const double exposure_ms = 1e3 * static_cast<double>(side.exposure_s);
+    times_ += name + " " + format_ns_as_seconds(stamp_ns) + " " + format_double(exposure_ms) + "\n";
     return write_png((mav_ / "data" / (name + ".png")).string(),
                      {side.width, side.height, side.format, *side.data});
   }

@@ -61,7 +61,8 @@ void turn_triggers_off(ArvDevice* device) {
   arv_device_set_string_feature_value(device, "TriggerMode", "Off", problem.slot());
 }
 
-/// Limits by the camera's own means, else by a pause between packets.
+/// Limits by the camera's own means, else by a pause between packets. A port of unknown speed (0)
+/// is taken as infinitely fast: the pause is then a little too long, never too short.
 Result<void> limit_throughput(ArvCamera* camera, int mbps, int packet_size, int port_mbps) {
   ArvDevice* device = arv_camera_get_device(camera);
   Problem problem;
@@ -78,9 +79,10 @@ Result<void> limit_throughput(ArvCamera* camera, int mbps, int packet_size, int 
     if (!problem && least <= most) limit = std::clamp<std::int64_t>(limit, least, most);
     arv_device_set_integer_feature_value(device, "DeviceLinkThroughputLimit", limit,
                                          problem.slot());
-  } else if (port_mbps > mbps) {
+  } else if (port_mbps == 0 || port_mbps > mbps) {
     const double bits = 8.0 * packet_size;
-    const double pause_ns = 1e3 * (bits / mbps - bits / port_mbps);
+    const double on_the_wire = port_mbps > 0 ? bits / port_mbps : 0.0;
+    const double pause_ns = 1e3 * (bits / mbps - on_the_wire);
     arv_camera_gv_set_packet_delay(camera, static_cast<gint64>(pause_ns), problem.slot());
   }
   if (problem) return Error{"limit of " + std::to_string(mbps) + " Mbit/s: " + problem.text()};
@@ -214,14 +216,13 @@ Result<LinkSetup> set_up_link(ArvCamera* camera, const AravisOptions& options, b
                  std::to_string(link.interface.mtu) + "; raise its MTU: sudo ip link set dev " +
                  link.interface.name + " mtu 9000"};
   }
-  const bool loopback = (ntohl(own.sin_addr.s_addr) >> 24U) == 127;
-  if (loopback) {
+  if ((ntohl(own.sin_addr.s_addr) >> 24U) == 127) {
     // A packet socket sees nothing of that interface.
     arv_gv_device_set_stream_options(device, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
   }
   const int port = link.interface.speed_mbps;
   link.limit_mbps = options.throughput_mbps;
-  if (link.limit_mbps == 0 && shared && !loopback) link.limit_mbps = port_share(port);
+  if (link.limit_mbps == 0 && shared) link.limit_mbps = port_share(port);
   if (link.limit_mbps > 0) {
     auto limited = limit_throughput(camera, link.limit_mbps, link.packet_size, port);
     if (!limited) return limited.failure();

@@ -112,7 +112,9 @@ std::string gige_description(const GigeSimulatorConfig& config) {
   text += command("AcquisitionStop", kAcquisitionStop);
   text += real("AcquisitionFrameRate", kFrameRate) + real("ExposureTime", kExposure);
   text += real("Gain", kGain) + real("DeviceTemperature", kTemperature);
-  text += integer("DeviceLinkThroughputLimit", kThroughputLimit, 125000000);
+  if (config.throughput_limit) {
+    text += integer("DeviceLinkThroughputLimit", kThroughputLimit, 125000000);
+  }
   text += command("TimestampLatch", kTimestampLatch);
   text += integer("TimestampLatchValue", kTimestampValue, 9223372036854775807, 8);
   text += triggers(config);

@@ -7,10 +7,12 @@
 
 #include <algorithm>
 #include <bit>
+#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <ctime>
 
+#include "driver/aravis/gige_bytes.h"
 #include "driver/aravis/gige_description.h"
 #include "sovo/driver/live/host_clock.h"
 
@@ -25,32 +27,13 @@ constexpr std::uint32_t kCapabilities = 0x934;
 constexpr std::uint32_t kPrivilege = 0xa00;
 constexpr std::uint32_t kStreamPort = 0xd00;
 constexpr std::uint32_t kStreamPacketSize = 0xd04;
+constexpr std::uint32_t kPacketDelay = 0xd08;  // in ticks of the clock, which are nanoseconds
 constexpr std::uint32_t kStreamAddress = 0xd18;
 constexpr std::uint16_t kInvalidAddress = 0x8003;
 constexpr std::int64_t kTai = 37'000'000'000;    // PTP's time is ahead of UTC
 constexpr std::int64_t kPtpTakes = 300'000'000;  // until its clock is set
 constexpr std::size_t kOverhead = 20 + 8 + 8;    // of IP, UDP and GVSP in a packet
 constexpr std::size_t kFramesKept = 6;
-
-using Bytes = std::vector<std::uint8_t>;
-
-template <class T>
-void append(T value, Bytes* bytes) {
-  for (int shift = 8 * static_cast<int>(sizeof(T)) - 8; shift >= 0; shift -= 8) {
-    bytes->push_back(static_cast<std::uint8_t>(value >> shift));
-  }
-}
-
-std::uint64_t number(const Bytes& bytes, std::size_t at, std::size_t size) {
-  std::uint64_t value = 0;
-  for (std::size_t i = 0; i < size && at + i < bytes.size(); ++i)
-    value = value << 8U | bytes[at + i];
-  return value;
-}
-
-std::uint32_t word(const Bytes& bytes, std::size_t at) {
-  return static_cast<std::uint32_t>(number(bytes, at, 4));
-}
 
 int bound_socket(const std::string& address, std::uint16_t port) {
   const int fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
@@ -297,7 +280,19 @@ void GigeSimulator::send_frame(std::int64_t instant_ns) {
   sent_.push_back(std::move(packets));
   if (sent_.size() > kFramesKept) sent_.pop_front();
   ++acquisition_frames_;
-  for (std::size_t i = 0; i < sent_.back().size(); ++i) send_packet(i, false);
+  for (std::size_t i = 0; i < sent_.back().size(); ++i) {
+    send_packet(i, false);
+    pause_after(sent_.back()[i].size());
+  }
+}
+
+/// Holds the next packet back for as long as the limit of the throughput and the pause between
+/// packets, which are set, say. It never catches up.
+void GigeSimulator::pause_after(std::size_t bytes) const {
+  if (!config_.port) return;
+  const double limit_ns = 1e9 * static_cast<double>(bytes) / get(kThroughputLimit);
+  std::this_thread::sleep_for(
+      std::chrono::nanoseconds(get(kPacketDelay) + static_cast<std::int64_t>(limit_ns)));
 }
 
 /// A packet of the newest frame.
@@ -309,6 +304,7 @@ void GigeSimulator::send_packet(std::size_t index, bool again) {
     ++counts_.packets_lost;
     return;
   }
+  if (config_.port && !config_.port->carry(packet.size())) return;
   sockaddr_in to{};
   to.sin_family = AF_INET;
   to.sin_port = htons(static_cast<std::uint16_t>(get(kStreamPort)));

@@ -7,12 +7,15 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <random>
 #include <string>
 #include <thread>
 #include <vector>
+
+#include "driver/aravis/shared_port.h"
 
 namespace sovo::gige {
 
@@ -26,6 +29,8 @@ struct GigeSimulatorConfig {
   bool software = true;
   bool chunks = true;
   bool resend = true;
+  bool throughput_limit = true;       ///< It has that feature.
+  std::shared_ptr<SharedPort> port;   ///< What its packets pass; none: they all arrive.
   double clock_ppm = 0.0;             ///< Error of its own clock.
   std::int64_t clock_offset_ns = 0;   ///< Its own clock when it is switched on.
   double chunk_exposure_us = 3000.0;  ///< Exposure that images bring along.
@@ -108,6 +113,7 @@ class GigeSimulator {
   void expose(std::int64_t instant_ns);
   void send_frame(std::int64_t instant_ns);
   void send_packet(std::size_t index, bool again);
+  void pause_after(std::size_t bytes) const;
   Packet payload(std::int64_t instant_ns) const;
   std::uint32_t payload_size() const;
 

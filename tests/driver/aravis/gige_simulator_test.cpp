@@ -2,9 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdlib>
+#include <memory>
 
 #include "driver/aravis/aravis_fixture.h"
+#include "sovo/driver/aravis/gige_network.h"
 #include "sovo/driver/live/host_clock.h"
 
 namespace sovo::gige {
@@ -121,6 +124,60 @@ TEST_F(GigeSimulatorTest, WithoutResendLossesAreCounted) {
   EXPECT_GE(report.cameras[0].counts.damaged, 3U);
   EXPECT_GE(report.cameras[0].counts.images, 3U);
   EXPECT_EQ(left.counts().packets_resent, 0U);
+}
+
+/// Cameras on one port of 32 Mbit/s, which keeps five packets, told to send at once by software.
+class OnePort : public GigeSimulatorTest {
+ protected:
+  void SetUp() override {
+    GigeSimulatorTest::SetUp();
+    options_.sync = aravis::Sync::kSoftware;
+    options_.frame_rate = 10.0;
+    options_.packet_size = 1400;
+    options_.resend = false;
+  }
+
+  /// Takes 20 images of each camera, whole or damaged, and gives the report.
+  LiveReport watch(bool with_feature) {
+    GigeSimulatorConfig left = without_ptp("LEFT");
+    GigeSimulatorConfig right = without_ptp("RIGHT");
+    left.port = right.port = port_;
+    left.throughput_limit = right.throughput_limit = with_feature;
+    GigeSimulator left_camera(left);
+    GigeSimulator right_camera(right);
+    EXPECT_TRUE(left_camera.is_running() && right_camera.is_running());
+    auto opened = open(kSimWidth, kSimHeight);
+    EXPECT_TRUE(opened) << opened.error();
+    if (!opened) return {};
+    return report_when(opened->source.get(), [](const LiveReport& report) {
+      return std::all_of(report.cameras.begin(), report.cameras.end(), [](const auto& camera) {
+        return camera.counts.images + camera.counts.damaged >= 20;
+      });
+    });
+  }
+
+  std::shared_ptr<SharedPort> port_ = std::make_shared<SharedPort>(32e6 / 8, 5 * 1400);
+};
+
+TEST_F(OnePort, IsTooSmallForTwoCamerasThatSendAsFastAsTheyCan) {
+  const LiveReport report = watch(true);
+  ASSERT_EQ(report.cameras.size(), 2U);
+  EXPECT_GT(port_->dropped(), 100U);
+  EXPECT_GT(report.cameras[0].counts.damaged + report.cameras[1].counts.damaged, 20U);
+}
+
+TEST_F(OnePort, CarriesBothWhenEachIsLimitedToItsShare) {
+  options_.throughput_mbps = aravis::port_share(32);
+  for (const bool with_feature : {true, false}) {
+    const LiveReport report = watch(with_feature);
+    ASSERT_EQ(report.cameras.size(), 2U);
+    EXPECT_EQ(port_->dropped(), 0U) << with_feature;
+    for (const CameraReport& camera : report.cameras) {
+      EXPECT_GE(camera.counts.images, 20U);
+      EXPECT_EQ(camera.counts.damaged, 0U);
+      EXPECT_EQ(counter(camera, "throughput_limit_mbps"), "14");
+    }
+  }
 }
 
 TEST_F(GigeSimulatorTest, ChunksBringTheExposureOfEachImage) {

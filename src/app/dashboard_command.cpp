@@ -1,3 +1,5 @@
+#include <sys/resource.h>
+
 #include <charconv>
 #include <cstdlib>
 #include <memory>
@@ -129,7 +131,15 @@ void open_browser(const std::string& address) {
   if (std::system(command.c_str()) != 0) spdlog::warn("no browser could be started");
 }
 
+/// Who watches must not hold up who drives: this thread, and all that it starts from now on, a
+/// browser too, come after the odometry on the same machine.
+void give_way() {
+  constexpr int kNiceness = 10;
+  (void)setpriority(PRIO_PROCESS, 0, kNiceness);
+}
+
 int run(const AppConfig& config, bool open) {
+  give_way();
   auto settings = server_config(config.dashboard);
   if (!settings) return fail(kUsage, settings.error());
   const auto domains = parse_domains(config.dashboard.domains);

@@ -165,6 +165,21 @@ async function run() {
     await until(async () => (await savedTum()).length === seen + 20, "old poses and new ones");
     await until(async () => /Tracking|Scale/.test(await stateName()), "a state again");
   });
+  await step("begins anew with an odometry that was started again", async () => {
+    const begin = 480; // under the same camera: stamps go on, the odometry's counts begin anew
+    const restarted = [];
+    for (let i = begin; i < begin + 60; ++i) {
+      const { status, scaled } = frameAt(i / kRate);
+      bus.send("status", { ...status, received: BigInt(i - begin), segment: 0 }, i / kRate);
+      if (!scaled) continue;
+      bus.send("scaled_odometry", { ...scaled, segment: 0 }, i / kRate);
+      restarted.push(kStart + i / kRate);
+    }
+    await until(async () => /started again/.test(await page.locator(".notices").textContent()), "a notice");
+    const seen = async () => (await savedTum()).map((line) => line[0]);
+    await until(async () => (await seen()).length === restarted.length, "the new poses alone");
+    (await seen()).forEach((time, i) => assert.ok(Math.abs(time - restarted[i]) < 1e-6));
+  });
   await step("shows another vehicle", async () => {
     const names = await page.locator("select[aria-label=vehicle] option").allTextContents();
     assert.deepEqual([...names].sort(), ["sovo", "tug"]);

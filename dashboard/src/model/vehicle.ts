@@ -134,6 +134,7 @@ export class Vehicle {
     private readonly link: Connection,
     readonly ns: string,
     mostMapPoints: number,
+    private readonly tell: (notice: string) => void,
   ) {
     this.map = new VoxelMap(mostMapPoints);
     this.hear("status", (m: VoStatus) => this.addStatus(m));
@@ -180,12 +181,9 @@ export class Vehicle {
   }
 
   clear(): void {
-    this.poses.clear();
+    this.clearRoom();
     this.poseTable.clear();
     this.statusTable.clear();
-    this.keyframes.clear();
-    this.keyframeRevision += 1;
-    this.map.clear();
     this.windowPoints = new Float32Array(0);
     this.windowRevision += 1;
     this.left.clear();
@@ -200,6 +198,8 @@ export class Vehicle {
 
   private addStatus(m: VoStatus): void {
     const now = performance.now();
+    const before = this.status;
+    if (before && (m.received < before.received || m.segment < before.segment)) this.beginRun();
     this.status = m;
     this.statusHeard = now;
     this.arrivals.push(now);
@@ -294,16 +294,31 @@ export class Vehicle {
     }
   }
 
+  /** The odometry was started again: its `odom` begins anew, and so do segments and keyframes. */
+  private beginRun(): void {
+    if (this.poses.length > 0) {
+      this.tell("The odometry was started again: its odom, and the room, begin anew");
+    }
+    this.clearRoom();
+    this.windowPoints = new Float32Array(0);
+    this.windowRevision += 1;
+    this.path = undefined;
+  }
+
   /** The stamps began again: another run of the same recording. */
   private startAnew(): void {
-    this.poses.clear();
+    this.clearRoom();
     this.poseTable.clear();
-    this.keyframes.clear();
-    this.keyframeRevision += 1;
-    this.map.clear();
     this.left.clear();
     this.right.clear();
     this.tracked.length = 0;
+  }
+
+  private clearRoom(): void {
+    this.poses.clear();
+    this.keyframes.clear();
+    this.keyframeRevision += 1;
+    this.map.clear();
   }
 }
 

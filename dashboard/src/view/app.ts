@@ -202,7 +202,8 @@ export class App {
   private choose(ns: string): void {
     if (this.vehicle?.ns === ns) return;
     this.vehicle?.end();
-    this.vehicle = new Vehicle(this.link, ns, this.software ? 12_000 : 250_000);
+    const mostMapPoints = this.software ? 12_000 : 250_000;
+    this.vehicle = new Vehicle(this.link, ns, mostMapPoints, (text) => this.notice(1, text));
     this.scene.setVehicle(this.vehicle);
     this.timeline.hold(undefined);
     this.chooser.value = ns;

@@ -227,8 +227,7 @@ CoarseTracker::LevelOutcome CoarseTracker::align_level(const TrackingReference& 
 
 TrackingResult CoarseTracker::try_hypothesis(const TrackingReference& reference,
                                              const ImagePyramid& pyramid, double exposure_s,
-                                             const Affine& guess, const SE3& start,
-                                             std::vector<double>* best_rmse) {
+                                             const Affine& guess, const SE3& start) {
   TrackingResult result;
   result.T_current_reference = start;
   result.affine = guess;
@@ -240,7 +239,7 @@ TrackingResult CoarseTracker::try_hypothesis(const TrackingReference& reference,
     outcome = align_level(reference, l, pyramid.level(l), exposure_s, &cutoff,
                           &result.T_current_reference, &result.affine,
                           kMaxIterations[static_cast<std::size_t>(std::min(l, 5))]);
-    double& best = (*best_rmse)[static_cast<std::size_t>(l)];
+    double& best = best_rmse_[static_cast<std::size_t>(l)];
     if (!outcome.finite || outcome.rmse > kLevelRejectFactor * best) return result;
     if (cutoff > config_.cutoff && !repeated) {
       repeated = true;
@@ -263,11 +262,11 @@ TrackingResult CoarseTracker::try_hypothesis(const TrackingReference& reference,
 TrackingResult CoarseTracker::track(const TrackingReference& reference, const ImagePyramid& pyramid,
                                     double exposure_s, const Affine& affine_guess,
                                     std::span<const SE3> hypotheses, double last_rmse) {
-  std::vector<double> best_rmse(reference.levels.size(), 1e10);
+  best_rmse_.assign(reference.levels.size(), 1e10);
   TrackingResult best;
   for (std::size_t i = 0; i < hypotheses.size(); ++i) {
     TrackingResult tried =
-        try_hypothesis(reference, pyramid, exposure_s, affine_guess, hypotheses[i], &best_rmse);
+        try_hypothesis(reference, pyramid, exposure_s, affine_guess, hypotheses[i]);
     tried.hypothesis = static_cast<int>(i);
     if (tried.good && (!best.good || tried.rmse < best.rmse)) best = tried;
     const bool enough = last_rmse > 0.0 && best.rmse < config_.lost_rmse_factor * last_rmse;
@@ -277,7 +276,7 @@ TrackingResult CoarseTracker::track(const TrackingReference& reference, const Im
   best.correlation = correlation(reference.levels[0], pyramid.level(0), best.T_current_reference);
   best.good = best.rmse < config_.max_rmse && best.inlier_ratio > config_.min_inlier_ratio &&
               best.correlation > config_.min_correlation;
-  measure_flow(reference, best.T_current_reference, &best.flow_translation, &best.flow_total);
+  best.motion = motion_of_points(reference, best.T_current_reference);
   return best;
 }
 
@@ -313,16 +312,13 @@ std::vector<SE3> CoarseTracker::rank(const TrackingReference& reference,
   return out;
 }
 
-void measure_flow(const TrackingReference& reference, const SE3& T, double* translation,
-                  double* total) {
+PointMotion motion_of_points(const TrackingReference& reference, const SE3& T_current_reference) {
   const ReferenceLevel& level = reference.levels[0];
-  const CameraModel& c = level.camera;
   constexpr std::size_t kStride = 32;
-  const Mat3 K = c.matrix();
-  const Mat3 Ki = K.inverse();
-  const Mat3 KRKi = K * T.rotation_matrix() * Ki;
-  double sum_t = 0.0;
-  double sum_total = 0.0;
+  const Mat3 K = level.camera.matrix();
+  const Mat3 KRKi = K * T_current_reference.rotation_matrix() * K.inverse();
+  const Vec3 Kt = K * T_current_reference.translation();
+  PointMotion sum;
   int n = 0;
   const auto flow = [](const Vec3& p, const Vec3& from) {
     const double du = p.x() / p.z() - from.x();
@@ -331,13 +327,14 @@ void measure_flow(const TrackingReference& reference, const SE3& T, double* tran
   };
   for (std::size_t i = 0; i < level.size(); i += kStride) {
     const Vec3 p(level.u[i], level.v[i], 1.0);
-    const Vec3 kt = K * T.translation() * level.rho[i];
-    sum_t += flow(p + kt, p) + flow(p - kt, p);
-    sum_total += flow(KRKi * p + kt, p) + flow(KRKi * p - kt, p);
+    const Vec3 kt = Kt * level.rho[i];
+    sum.flow_translation += flow(p + kt, p) + flow(p - kt, p);
+    sum.flow_total += flow(KRKi * p + kt, p) + flow(KRKi * p - kt, p);
+    sum.approach += 2.0 * std::abs(kt.z());
     n += 2;
   }
-  *translation = n > 0 ? std::sqrt(sum_t / n) : 0.0;
-  *total = n > 0 ? std::sqrt(sum_total / n) : 0.0;
+  if (n == 0) return {};
+  return {std::sqrt(sum.flow_translation / n), std::sqrt(sum.flow_total / n), sum.approach / n};
 }
 
 }  // namespace sovo

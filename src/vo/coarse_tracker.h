@@ -12,6 +12,16 @@
 namespace sovo {
 
 /// How a frame was tracked.
+/// How a motion moves the points of a reference in the image of level 0.
+struct PointMotion {
+  double flow_translation = 0.0;  ///< RMS flow without the rotation [px].
+  double flow_total = 0.0;        ///< RMS flow [px].
+  double approach = 0.0;  ///< Mean motion along the view, to and fro alike, in the points' depths.
+};
+
+/// That of `T_current_reference` (the flows as in DSO, Sec. 3.1, "keyframe creation").
+PointMotion motion_of_points(const TrackingReference& reference, const SE3& T_current_reference);
+
 struct TrackingResult {
   bool good = false;
   SE3 T_current_reference;
@@ -21,8 +31,7 @@ struct TrackingResult {
   double view_ratio = 0.0;    ///< Reference pixels that are in view.
   double correlation = 0.0;   ///< Of the brightness of reference pixels in view and image, -1..1.
   int inliers = 0;
-  double flow_translation = 0.0;    ///< RMS flow of the points without the rotation [px].
-  double flow_total = 0.0;          ///< RMS flow of the points [px].
+  PointMotion motion;               ///< From the reference to this frame.
   Mat6 information = Mat6::Zero();  ///< Of T_current_reference (left perturbation), unit noise.
   int hypothesis = 0;               ///< Which motion hypothesis was taken.
 };
@@ -73,16 +82,11 @@ class CoarseTracker {
                            double exposure_s, double* cutoff, SE3* T, Affine* affine,
                            int max_iterations);
   TrackingResult try_hypothesis(const TrackingReference& reference, const ImagePyramid& pyramid,
-                                double exposure_s, const Affine& guess, const SE3& start,
-                                std::vector<double>* best_rmse);
+                                double exposure_s, const Affine& guess, const SE3& start);
 
   TrackerConfig config_;
   WarpedPoints warped_;
+  std::vector<double> best_rmse_;  ///< Of the hypotheses tried so far, by level.
 };
-
-/// RMS flow [px of level 0] of the reference's points under a motion: without its rotation, and
-/// whole (DSO, Sec. 3.1, "keyframe creation").
-void measure_flow(const TrackingReference& reference, const SE3& T_current_reference,
-                  double* translation, double* total);
 
 }  // namespace sovo

@@ -34,11 +34,12 @@ struct TrackerConfig {
 /// 1120 / (width + height)) and the brightness change exceeds 1, or a smaller sum and a residual
 /// twice the first one's.
 struct KeyframeConfig {
-  double flow_translation = 0.04;
+  double flow_translation = 0.02;
   double flow_total = 0.02;
+  double approach = 9.0;
   double brightness = 2.0;
   double rmse_factor = 2.0;
-  double rmse_min_score = 0.2;
+  double rmse_min_score = 0.13;
   int max_keyframes = 7;          ///< In the window, the newest included.
   int min_keyframes = 5;          ///< Kept although few of their points remain.
   double min_points_left = 0.05;  ///< A keyframe with a smaller share of its points leaves.
@@ -48,6 +49,7 @@ struct KeyframeConfig {
   void visit(Visitor& v) {
     v("flow_translation", flow_translation, "weight of the flow without rotation");
     v("flow_total", flow_total, "weight of the flow");
+    v("approach", approach, "weight of the motion along the view, in depths of the points");
     v("brightness", brightness, "weight of the change of log-gain");
     v("rmse_factor", rmse_factor, "a keyframe is made above this x the first residual");
     v("rmse_min_score", rmse_min_score, "weighted sum below which no residual makes a keyframe");

@@ -41,8 +41,9 @@ bool wants_keyframe(const KeyframeConfig& config, const CameraModel& camera,
   const double unit = kFlowUnit / (camera.width + camera.height);
   const BrightnessTransfer transfer =
       brightness_transfer(reference.affine, reference.exposure_s, tracked.affine, exposure_s);
-  const double score = config.flow_translation * unit * tracked.flow_translation +
-                       config.flow_total * unit * tracked.flow_total +
+  const double score = config.flow_translation * unit * tracked.motion.flow_translation +
+                       config.flow_total * unit * tracked.motion.flow_total +
+                       config.approach * tracked.motion.approach +
                        config.brightness * std::abs(std::log(transfer.gain));
   // The residual of a camera at rest is noise, and twice of it nothing that a keyframe would mend:
   // without parallax the window's scale would be left to that noise.

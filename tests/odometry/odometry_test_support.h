@@ -99,6 +99,8 @@ inline StereoOdometryConfig test_config() {
   config.threads = 1;
   config.vo.points.active_points = 600;
   config.vo.points.immature_points = 500;
+  // Several keyframes in a second or two.
+  config.vo.keyframe.flow_translation = 0.04;
   return config;
 }
 

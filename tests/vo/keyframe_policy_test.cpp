@@ -15,9 +15,10 @@ class KeyframeDecision : public ::testing::Test {
   }
 
   /// Flow of the whole image without rotation [px], residual over that of the first frame.
-  bool wanted(double flow_px, double rmse_ratio, double log_gain = 0.0) const {
+  bool wanted(double flow_px, double rmse_ratio, double log_gain = 0.0,
+              double approach = 0.0) const {
     TrackingResult tracked;
-    tracked.flow_translation = tracked.flow_total = flow_px;
+    tracked.motion = {flow_px, flow_px, approach};
     tracked.rmse = rmse_ratio;
     tracked.affine.a = log_gain;
     return wants_keyframe(KeyframeConfig(), camera_, TrackingReference(), tracked, 0.0, 1.0);
@@ -27,11 +28,16 @@ class KeyframeDecision : public ::testing::Test {
 };
 
 TEST_F(KeyframeDecision, FlowOrBrightnessAloneSuffices) {
-  EXPECT_FALSE(wanted(16.0, 1.0));
-  EXPECT_TRUE(wanted(17.0, 1.0));
+  EXPECT_FALSE(wanted(24.0, 1.0));
+  EXPECT_TRUE(wanted(26.0, 1.0));
   EXPECT_FALSE(wanted(0.0, 1.0, 0.49));
   EXPECT_TRUE(wanted(0.0, 1.0, 0.51));
   EXPECT_TRUE(wanted(0.0, 1.0, -0.51));
+}
+
+TEST_F(KeyframeDecision, MotionAlongTheViewSufficesWhereItMakesLittleFlow) {
+  EXPECT_FALSE(wanted(5.0, 1.0, 0.0, 0.08));
+  EXPECT_TRUE(wanted(5.0, 1.0, 0.0, 0.1));
 }
 
 TEST_F(KeyframeDecision, ABadFitMakesOneWhereThereIsParallax) {

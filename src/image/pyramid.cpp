@@ -31,8 +31,12 @@ int ImagePyramid::num_levels_for(int width, int height, int max_levels, int min_
 }
 
 ImagePyramid::ImagePyramid(ImageF level0, int levels) {
+  levels_.push_back(std::move(level0));
+  halve_to(levels);
+}
+
+void ImagePyramid::halve_to(int levels) {
   levels_.resize(static_cast<std::size_t>(levels));
-  levels_[0] = std::move(level0);
   for (int l = 1; l < levels; ++l) {
     halve(levels_[static_cast<std::size_t>(l - 1)], &levels_[static_cast<std::size_t>(l)]);
   }

@@ -20,11 +20,22 @@ class ImagePyramid {
   /// Builds `levels` levels from level 0, whose pixels are taken over.
   ImagePyramid(ImageF level0, int levels);
 
+  /// Lets `fill` (ImageF*) write level 0 and builds as many levels as its size has, at most
+  /// `max_levels`, in the memory that they had.
+  template <class Fill>
+  void rebuild(int max_levels, const Fill& fill) {
+    if (levels_.empty()) levels_.resize(1);
+    fill(&levels_[0]);
+    halve_to(num_levels_for(levels_[0].width(), levels_[0].height(), max_levels));
+  }
+
   int num_levels() const { return static_cast<int>(levels_.size()); }
   const ImageF& level(int l) const { return levels_[static_cast<std::size_t>(l)]; }
   const ImageF& operator[](int l) const { return level(l); }
 
  private:
+  void halve_to(int levels);
+
   std::vector<ImageF> levels_;
 };
 

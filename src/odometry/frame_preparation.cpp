@@ -97,19 +97,18 @@ MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver
   MonoFrame out;
   out.stamp_ns = frame.stamp_ns;
   out.exposure_s = frame.left.exposure_s;
-  ImageF image;
-  {
-    const ScopedStage stage(observer, Stage::kUndistortion);
+  auto pyramid = left_pyramids_.take();
+  std::optional<ScopedStage> stage(std::in_place, observer, Stage::kUndistortion);
+  pyramid->rebuild(max_levels_, [&](ImageF* image) {
     if (undistorter_) {
       to_float(frame.left, cameras_.left_photometric, downscale_, &raw_left_);
-      undistorter_->apply(raw_left_, &image);
+      undistorter_->apply(raw_left_, image);
     } else {
-      to_float(frame.left, cameras_.left_photometric, downscale_, &image);
+      to_float(frame.left, cameras_.left_photometric, downscale_, image);
     }
-  }
-  const ScopedStage stage(observer, Stage::kPyramid);
-  const int levels = ImagePyramid::num_levels_for(image.width(), image.height(), max_levels_);
-  out.pyramid = std::make_shared<ImagePyramid>(std::move(image), levels);
+    stage.emplace(observer, Stage::kPyramid);
+  });
+  out.pyramid = std::move(pyramid);
   return out;
 }
 

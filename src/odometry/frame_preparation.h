@@ -4,6 +4,7 @@
 #include <string>
 
 #include "sovo/image/pyramid.h"
+#include "sovo/image/pyramid_pool.h"
 #include "sovo/image/stereo_frame.h"
 #include "sovo/image/undistorter.h"
 #include "sovo/odometry/stereo_odometry.h"
@@ -39,6 +40,7 @@ class FramePreparation {
   std::optional<Undistorter> undistorter_;
   ImageU8 left_mask_;
   ImageF raw_left_;
+  PyramidPool left_pyramids_;
 };
 
 /// Times a stage and reports it when it goes out of scope.

@@ -334,6 +334,7 @@ void DirectOdometry::take_snapshot() {
   s.camera = camera_;
   s.pyramid = newest.pyramid;
   s.mean_inverse_depth = window_.mean_inverse_depth();
+  s.points.reserve(static_cast<std::size_t>(window_.num_active_points()));
   std::size_t shared = 0;
   for (int h = 0; h + 1 < window_.size(); ++h) {
     for (Point& p : window_[h].points) {

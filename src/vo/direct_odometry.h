@@ -135,9 +135,8 @@ class DirectOdometry {
   std::vector<WindowPose> window_poses() const;
   void take_snapshot();
   TrackedFrame track_hypotheses(const MonoFrame& frame,
-                                std::shared_ptr<const TrackingReference> reference,
-                                const std::vector<SE3>& hypotheses);
-  std::vector<SE3> motion_hypotheses(const TrackingReference& reference, const MonoFrame& frame);
+                                std::shared_ptr<const TrackingReference> reference);
+  void find_motion_hypotheses(const TrackingReference& reference, const MonoFrame& frame);
 
   DirectConfig config_;
   CameraModel camera_;
@@ -171,6 +170,7 @@ class DirectOdometry {
     std::int64_t stamp_ns = 0;
   };
   std::vector<PastFrame> past_;  ///< The last two frames, newest last.
+  std::vector<SE3> hypotheses_;  ///< T_camera_reference of the new frame, the likeliest first.
   double expected_steps_ = 1.0;  ///< Time to the new frame over that between the past two.
   Affine last_affine_;
   double last_rmse_ = 0.0;

@@ -46,35 +46,37 @@ SE3 scaled_motion(const SE3& motion, double factor) { return SE3::exp(factor * m
 
 }  // namespace
 
-std::vector<SE3> DirectOdometry::motion_hypotheses(const TrackingReference& reference,
-                                                   const MonoFrame& frame) {
+void DirectOdometry::find_motion_hypotheses(const TrackingReference& reference,
+                                            const MonoFrame& frame) {
   const SE3 T_reference_world = reference.T_world_camera.inverse();
   // Past frames relative to the reference, in its scale.
-  std::vector<SE3> from_reference;
+  std::array<SE3, 2> from_reference;
+  std::size_t known = 0;
   for (const PastFrame& past : past_) {
     if (past.stamp_ns == reference.stamp_ns) {
-      from_reference.emplace_back();
+      from_reference[known++] = SE3();
       continue;
     }
     for (const auto& [id, T_world_keyframe] : reference.keyframe_poses) {
       if (id != past.keyframe_id) continue;
       SE3 T = past.T_camera_keyframe;
       T.translation() *= std::exp(reference.log_scale - past.log_scale);
-      from_reference.push_back(T * (T_reference_world * T_world_keyframe).inverse());
+      from_reference[known++] = T * (T_reference_world * T_world_keyframe).inverse();
+      break;
     }
   }
-  const SE3 last = from_reference.empty() ? SE3() : from_reference.back();
-  if (from_reference.size() < 2) {
-    return tracker_.rank(reference, *frame.pyramid, frame.exposure_s, last_affine_,
-                         unknown_motions(last, reference.mean_rho), kUnknownMotionsKept);
+  const SE3 last = known == 0 ? SE3() : from_reference[known - 1];
+  if (known < 2) {
+    hypotheses_ = tracker_.rank(reference, *frame.pyramid, frame.exposure_s, last_affine_,
+                                unknown_motions(last, reference.mean_rho), kUnknownMotionsKept);
+    return;
   }
   // Constant velocity over the true time between the frames, which may have been dropped.
   const SE3 motion = last * from_reference[0].inverse();
   const SE3 expected = scaled_motion(motion, expected_steps_) * last;
-  std::vector<SE3> out = {expected, scaled_motion(motion, 2.0 * expected_steps_) * last,
-                          scaled_motion(motion, 0.5 * expected_steps_) * last, last, SE3()};
-  add_rotations(expected, &out);
-  return out;
+  hypotheses_ = {expected, scaled_motion(motion, 2.0 * expected_steps_) * last,
+                 scaled_motion(motion, 0.5 * expected_steps_) * last, last, SE3()};
+  add_rotations(expected, &hypotheses_);
 }
 
 TrackedFrame DirectOdometry::track(const MonoFrame& frame) {
@@ -84,24 +86,24 @@ TrackedFrame DirectOdometry::track(const MonoFrame& frame) {
     expected_steps_ = static_cast<double>(frame.stamp_ns - past_[1].stamp_ns) / before;
   }
   auto ref = reference();
-  const std::vector<SE3> hypotheses = motion_hypotheses(*ref, frame);
-  return track_hypotheses(frame, std::move(ref), hypotheses);
+  find_motion_hypotheses(*ref, frame);
+  return track_hypotheses(frame, std::move(ref));
 }
 
 TrackedFrame DirectOdometry::track_from(const MonoFrame& frame, const SE3& T_current_reference) {
-  return track_hypotheses(frame, reference(), {T_current_reference});
+  hypotheses_ = {T_current_reference};
+  return track_hypotheses(frame, reference());
 }
 
 TrackedFrame DirectOdometry::track_hypotheses(const MonoFrame& frame,
-                                              std::shared_ptr<const TrackingReference> reference,
-                                              const std::vector<SE3>& hypotheses) {
+                                              std::shared_ptr<const TrackingReference> reference) {
   TrackedFrame out;
   out.frame = frame;
   out.reference = std::move(reference);
   const TrackingReference& ref = *out.reference;
   const bool same_reference = has_first_rmse_ && first_rmse_keyframe_ == ref.keyframe_id;
   out.tracking =
-      tracker_.track(ref, *frame.pyramid, frame.exposure_s, last_affine_, hypotheses, last_rmse_);
+      tracker_.track(ref, *frame.pyramid, frame.exposure_s, last_affine_, hypotheses_, last_rmse_);
   if (!out.tracking.good) return out;
 
   if (!same_reference) {

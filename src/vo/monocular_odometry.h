@@ -16,6 +16,9 @@ struct KeyframePoints {
   std::vector<float> inverse_depth;  ///< 1 / z in the keyframe's camera frame [1/m].
   std::vector<float> sigma;          ///< Standard deviation of inverse_depth [1/m].
   std::size_t size() const { return u.size(); }
+  void reserve(std::size_t n) {
+    for (auto* values : {&u, &v, &inverse_depth, &sigma}) values->reserve(n);
+  }
 };
 
 /// What a monocular odometry hands out about its newest keyframe: all that scale optimization

@@ -5,6 +5,8 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -16,77 +18,116 @@ constexpr int kBorder = 2;
 
 /// Weighted inverse depth of a pixel: sums of rho * w and of w.
 struct Cell {
-  int x = 0;
+  int x = 0, y = 0;
   float sum = 0.0F, weight = 0.0F;
 };
 
-/// Inverse depths of one level, sparse: the cells of each row from left to right.
-struct DepthMap {
-  int width = 0;
-  std::vector<std::vector<Cell>> rows;
+/// Inverse depths of one level, sparse: the cells from left to right, row after row.
+class DepthMap {
+ public:
+  DepthMap(int width, int height) : width_(width), begins_(static_cast<std::size_t>(height) + 1) {}
 
-  DepthMap(int w, int h) : width(w), rows(static_cast<std::size_t>(h)) {}
-  int height() const { return static_cast<int>(rows.size()); }
-
-  void add(float u, float v, float rho, float w) {
-    const int x = static_cast<int>(u + 0.5F);
-    const int y = static_cast<int>(v + 0.5F);
-    if (x < 0 || y < 0 || x >= width || y >= height()) return;
-    rows[static_cast<std::size_t>(y)].push_back({x, rho * w, w});
+  int width() const { return width_; }
+  int height() const { return static_cast<int>(begins_.size()) - 1; }
+  std::span<const Cell> row(int y) const {
+    const std::size_t begin = begins_[static_cast<std::size_t>(y)];
+    return {cells_.data() + begin, begins_[static_cast<std::size_t>(y) + 1] - begin};
   }
+  std::size_t size() const { return cells_.size(); }
+
+  void reserve(std::size_t cells) { cells_.reserve(cells); }
+  /// Appends to the row at hand. A cell beside the image is left out.
+  void add(const Cell& cell) {
+    if (cell.x >= 0 && cell.x < width_) cells_.push_back(cell);
+  }
+  /// Closes row y, the one at hand: sorts it and adds up what fell into one pixel, in the order in
+  /// which it did.
+  void close_row(int y) {
+    const auto begin = cells_.begin() + begins_[static_cast<std::size_t>(y)];
+    // By insertion: rows are short, and this neither swaps equals nor allocates.
+    for (auto next = begin; next != cells_.end(); ++next) {
+      const auto place = std::upper_bound(begin, next, next->x,
+                                          [](int x, const Cell& cell) { return x < cell.x; });
+      std::rotate(place, next, next + 1);
+    }
+    auto kept = begin;
+    for (auto cell = begin; cell != cells_.end(); ++cell) {
+      if (kept != begin && (kept - 1)->x == cell->x) {
+        (kept - 1)->sum += cell->sum;
+        (kept - 1)->weight += cell->weight;
+      } else {
+        *kept++ = *cell;
+      }
+    }
+    cells_.erase(kept, cells_.end());
+    begins_[static_cast<std::size_t>(y) + 1] = static_cast<std::uint32_t>(cells_.size());
+  }
+
+ private:
+  int width_;
+  std::vector<Cell> cells_;
+  std::vector<std::uint32_t> begins_;  ///< Of the rows among the cells, and the end.
 };
 
-/// Sorts a row and adds up what fell into one pixel, in the order in which it did.
-void merge(std::vector<Cell>* row) {
-  std::stable_sort(row->begin(), row->end(),
-                   [](const Cell& a, const Cell& b) { return a.x < b.x; });
-  std::size_t kept = 0;
-  for (const Cell& cell : *row) {
-    if (kept > 0 && (*row)[kept - 1].x == cell.x) {
-      (*row)[kept - 1].sum += cell.sum;
-      (*row)[kept - 1].weight += cell.weight;
-    } else {
-      (*row)[kept++] = cell;
-    }
-  }
-  row->resize(kept);
-}
-
-DepthMap splat(const Window& window, std::size_t* count) {
+/// Window points in the newest keyframe, as they come; their number is `count`.
+std::vector<Cell> project_points(const Window& window, std::size_t* count) {
   const Keyframe& newest = window.newest();
   const auto slot = static_cast<std::size_t>(newest.slot);
   const double rho_unit = window.mean_inverse_depth();
-  DepthMap map(newest.image().width(), newest.image().height());
+  std::vector<Cell> cells;
+  cells.reserve(static_cast<std::size_t>(window.num_active_points()));
   *count = 0;
+  const auto add = [&](float u, float v, float rho, float w) {
+    cells.push_back({static_cast<int>(u + 0.5F), static_cast<int>(v + 0.5F), rho * w, w});
+    ++*count;
+  };
   for (int h = 0; h < window.size(); ++h) {
     for (const Point& p : window[h].points) {
       const double information = depth_information(p, rho_unit) * rho_unit * rho_unit;
       const auto weight = static_cast<float>(std::sqrt(1e-3 * (information + 1e-6)));
       if (h + 1 == window.size()) {
-        map.add(p.u, p.v, static_cast<float>(p.rho), weight);
-        ++*count;
+        add(p.u, p.v, static_cast<float>(p.rho), weight);
         continue;
       }
       const Residual& r = p.residuals[slot];
-      if (r.state != ResidualState::kIn) continue;
-      map.add(r.centre_u, r.centre_v, r.centre_rho, weight);
-      ++*count;
+      if (r.state == ResidualState::kIn) add(r.centre_u, r.centre_v, r.centre_rho, weight);
     }
   }
-  for (auto& row : map.rows) merge(&row);
+  return cells;
+}
+
+DepthMap splat(const Window& window, std::size_t* count) {
+  const std::vector<Cell> cells = project_points(window, count);
+  const int height = window.newest().image().height();
+  // Sorted by counting how many come before each row.
+  std::vector<std::uint32_t> ends(static_cast<std::size_t>(height) + 1);
+  const auto is_inside = [height](const Cell& c) { return c.y >= 0 && c.y < height; };
+  for (const Cell& c : cells) {
+    if (is_inside(c)) ++ends[static_cast<std::size_t>(c.y) + 1];
+  }
+  std::partial_sum(ends.begin(), ends.end(), ends.begin());
+  std::vector<Cell> by_row(ends.back());
+  for (const Cell& c : cells) {
+    if (is_inside(c)) by_row[ends[static_cast<std::size_t>(c.y)]++] = c;
+  }
+  DepthMap map(window.newest().image().width(), height);
+  map.reserve(by_row.size());
+  auto next = by_row.begin();
+  for (int y = 0; y < height; ++y) {
+    for (; next != by_row.end() && next->y == y; ++next) map.add(*next);
+    map.close_row(y);
+  }
   return map;
 }
 
 DepthMap sum_down(const DepthMap& fine) {
-  DepthMap coarse(fine.width / 2, fine.height() / 2);
-  for (std::size_t y = 0; y < coarse.rows.size(); ++y) {
-    std::vector<Cell>& row = coarse.rows[y];
-    for (const std::size_t fine_y : {2 * y, 2 * y + 1}) {
-      for (const Cell& cell : fine.rows[fine_y]) {
-        if (cell.x / 2 < coarse.width) row.push_back({cell.x / 2, cell.sum, cell.weight});
-      }
+  DepthMap coarse(fine.width() / 2, fine.height() / 2);
+  coarse.reserve(fine.size());
+  for (int y = 0; y < coarse.height(); ++y) {
+    for (const int fine_y : {2 * y, 2 * y + 1}) {
+      for (const Cell& c : fine.row(fine_y)) coarse.add({c.x / 2, y, c.sum, c.weight});
     }
-    merge(&row);
+    coarse.close_row(y);
   }
   return coarse;
 }
@@ -96,8 +137,8 @@ DepthMap sum_down(const DepthMap& fine) {
 class DenseRows {
  public:
   explicit DenseRows(const DepthMap& map)
-      : map_(map), wanted_(static_cast<std::size_t>(map.width) / 64 + 1) {
-    for (auto& row : dense_) row.resize(static_cast<std::size_t>(map.width));
+      : map_(map), wanted_(static_cast<std::size_t>(map.width()) / 64 + 1) {
+    for (auto& row : dense_) row.resize(static_cast<std::size_t>(map.width()));
     fill(0);
   }
 
@@ -111,7 +152,7 @@ class DenseRows {
     for (std::size_t word = 0; word < wanted_.size(); ++word) {
       for (std::uint64_t bits = std::exchange(wanted_[word], 0); bits != 0; bits &= bits - 1) {
         const int x = static_cast<int>(word * 64) + std::countr_zero(bits);
-        if (x >= 1 && x + 1 < map_.width) visit(at(x, y));
+        if (x >= 1 && x + 1 < map_.width()) visit(at(x, y));
       }
     }
     clear(y - 1);
@@ -121,7 +162,7 @@ class DenseRows {
   using Offset = std::array<int, 2>;
 
   std::vector<Cell>& dense(int y) { return dense_[static_cast<std::size_t>(y) % 3]; }
-  const std::vector<Cell>& sparse(int y) const { return map_.rows[static_cast<std::size_t>(y)]; }
+  std::span<const Cell> sparse(int y) const { return map_.row(y); }
   void fill(int y) {
     for (const Cell& cell : sparse(y)) dense(y)[static_cast<std::size_t>(cell.x)] = cell;
   }
@@ -129,7 +170,7 @@ class DenseRows {
     for (const Cell& cell : sparse(y)) dense(y)[static_cast<std::size_t>(cell.x)] = {};
   }
   void want(int x) {
-    if (x < 0 || x >= map_.width) return;
+    if (x < 0 || x >= map_.width()) return;
     wanted_[static_cast<std::size_t>(x) / 64] |= std::uint64_t{1} << static_cast<unsigned>(x) % 64;
   }
   void mark(int row, bool middle) {
@@ -145,7 +186,7 @@ class DenseRows {
     const Cell& own = dense(y)[static_cast<std::size_t>(x)];
     if (own.weight > 0.0F) return own;
     constexpr std::array<Offset, 4> kNeighbours = {{{0, -1}, {-1, 0}, {1, 0}, {0, 1}}};
-    Cell mean{.x = x};
+    Cell mean{.x = x, .y = y};
     int n = 0;
     for (const Offset& o : kNeighbours) {
       const Cell& cell = dense(y + o[1])[static_cast<std::size_t>(x + o[0])];
@@ -164,6 +205,9 @@ class DenseRows {
   std::array<std::vector<Cell>, 3> dense_;
   std::vector<std::uint64_t> wanted_;
 };
+
+/// A pixel and its neighbours, some of which are shared.
+constexpr std::size_t kDenseGrowth = 4;
 
 /// Levels that have points enough as they are: neighbours would cost more than they add.
 constexpr int kSparseLevels = 2;
@@ -184,9 +228,7 @@ void add_point(const ImageF& image, int y, const Cell& cell, ReferenceLevel* lev
 /// Points of a level: the pixels with a depth.
 void extract_sparse(const DepthMap& map, const ImageF& image, ReferenceLevel* level) {
   for (int y = kBorder; y < image.height() - kBorder; ++y) {
-    for (const Cell& cell : map.rows[static_cast<std::size_t>(y)]) {
-      add_point(image, y, cell, level);
-    }
+    for (const Cell& cell : map.row(y)) add_point(image, y, cell, level);
   }
 }
 
@@ -218,6 +260,9 @@ TrackingReference build_tracking_reference(const Window& window, int num_levels)
     ReferenceLevel& level = ref.levels[static_cast<std::size_t>(l)];
     level.camera = window.camera().at_level(l);
     const auto extract = l < kSparseLevels ? extract_sparse : extract_dense;
+    for (auto* values : {&level.u, &level.v, &level.rho, &level.colour}) {
+      values->reserve(l < kSparseLevels ? map.size() : kDenseGrowth * map.size());
+    }
     extract(map, newest.pyramid->level(l), &level);
   }
   double sum = 0.0;

@@ -21,7 +21,7 @@ void WorkerPool::drain() {
   for (int i = next_.fetch_add(1); i < n_; i = next_.fetch_add(1)) (*job_)(i);
 }
 
-void WorkerPool::run(int n, const std::function<void(int)>& job) {
+void WorkerPool::run_function(int n, const std::function<void(int)>& job) {
   if (workers_.empty() || n < 2) {
     for (int i = 0; i < n; ++i) job(i);
     return;

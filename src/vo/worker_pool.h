@@ -24,10 +24,15 @@ class WorkerPool {
 
   int threads() const { return static_cast<int>(workers_.size()) + 1; }
 
-  /// Runs job(0) ... job(n - 1) and returns when all are done. One caller at a time.
-  void run(int n, const std::function<void(int)>& job);
+  /// Runs job(0) ... job(n - 1) and returns when all are done. One caller at a time. Allocates no
+  /// memory, whatever the job holds.
+  template <class Job>
+  void run(int n, const Job& job) {
+    run_function(n, std::cref(job));
+  }
 
  private:
+  void run_function(int n, const std::function<void(int)>& job);
   void work();
   void drain();
 

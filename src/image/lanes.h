@@ -60,11 +60,13 @@ template <class Kernel, class... Args>
 auto run_narrow(const Args&... args) {
   return Kernel::template run<Lane>(args...);
 }
+
 /// And in eight; only where `has_wide_lanes`.
 template <class Kernel, class... Args>
 SOVO_WIDE_FUNCTION auto run_wide(const Args&... args) {
   return Kernel::template run<WideLane>(args...);
 }
+
 /// In the widest lanes that this processor has.
 template <class Kernel, class... Args>
 auto run_kernel(const Args&... args) {
@@ -94,6 +96,7 @@ template <class F>
 inline constexpr std::size_t lanes_of = sizeof(F) / sizeof(float);
 template <class F>
 using MaskOf = typename lane_detail::Traits<F>::Mask;
+
 /// As many doubles.
 template <class F>
 using DoublesOf = typename lane_detail::Traits<F>::Doubles;
@@ -122,6 +125,7 @@ template <class F = Lane>
 SOVO_LANE_FUNCTION F lane_of(float x) {
   return x - F{};
 }
+
 /// 0, 1, 2, ...
 template <class F = Lane>
 SOVO_LANE_FUNCTION F lane_index() {
@@ -158,6 +162,7 @@ SOVO_LANE_FUNCTION bool all_of(const WideLaneMask& mask) {
   const LaneMask high = __builtin_shufflevector(mask, mask, 4, 5, 6, 7);
   return all_of(low & high);
 }
+
 /// Whether it holds in none.
 SOVO_LANE_FUNCTION bool none_of(const LaneMask& mask) {
   return (mask[0] | mask[1] | mask[2] | mask[3]) == 0;
@@ -167,6 +172,7 @@ SOVO_LANE_FUNCTION bool none_of(const WideLaneMask& mask) {
   const LaneMask high = __builtin_shufflevector(mask, mask, 4, 5, 6, 7);
   return none_of(low | high);
 }
+
 /// The lesser; b where one is not a number.
 template <class F>
 SOVO_LANE_FUNCTION F min_lane(const F& a, const F& b) {
@@ -194,6 +200,7 @@ SOVO_LANE_FUNCTION WideLane sqrt_lane(const WideLane& v) {
 
 /// Sum in a fixed order.
 SOVO_LANE_FUNCTION float sum_lane(const Lane& v) { return (v[0] + v[1]) + (v[2] + v[3]); }
+
 /// Rows become columns; of eight lanes in each half.
 SOVO_LANE_FUNCTION void transpose(Lane* a, Lane* b, Lane* c, Lane* d) {
   const Lane ab_low = __builtin_shufflevector(*a, *b, 0, 4, 1, 5);
@@ -227,6 +234,7 @@ SOVO_LANE_FUNCTION WideLane fold(const WideLane& a, const WideLane& b) {
   return __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11) +
          __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15);
 }
+
 /// Sums of eight values at eight places each, `v[i]` the i-th value: of four of their halves.
 SOVO_LANE_FUNCTION void store_sums(const WideLane* v, float* sums) {
   WideLane a = fold(v[0], v[4]);
@@ -311,6 +319,7 @@ SOVO_LANE_FUNCTION Lane load_row(const float* p, const std::int32_t* offset, Lan
 SOVO_LANE_FUNCTION WideLane load_row(const float* p, const std::int32_t* offset, WideLane /*of*/) {
   return join(load_lane(p + offset[0]), load_lane(p + offset[kLanes]));
 }
+
 /// v[I] in all four lanes; of eight v[I] in the first and v[I + 4] in the last.
 template <std::size_t I>
 SOVO_LANE_FUNCTION Lane spread(const Lane& v) {

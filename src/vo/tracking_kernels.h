@@ -10,10 +10,10 @@
 namespace sovo {
 
 /// Points are worked on by groups, whatever the lanes: sums are then the same.
-constexpr std::size_t kTrackedGroup = kWideLanes;
+inline constexpr std::size_t kTrackedGroup = kWideLanes;
 /// Lanes of a group.
 template <class F>
-constexpr std::size_t kParts = kTrackedGroup / lanes_of<F>;
+inline constexpr std::size_t kParts = kTrackedGroup / lanes_of<F>;
 
 /// Motion and camera of a level, as the residuals want them.
 struct Warp {
@@ -212,7 +212,7 @@ struct ResidualPass {
 };
 
 /// Upper triangle of a 9x9 Gram matrix.
-constexpr std::size_t kGram = 45;
+inline constexpr std::size_t kGram = 45;
 
 /// What the Jacobians of brightness need.
 struct BrightnessJacobian {

@@ -66,11 +66,13 @@ class Publication {
 
  private:
   /// The first frames of a recording would go unheard while the processes find each other: waits
-  /// for a listener, and for others that are about to be found.
+  /// for a listener, and for others that are about to be found; longer where no odometry is among
+  /// them, for it may be one of those.
   void wait_for_listeners() {
     using Clock = std::chrono::steady_clock;
     constexpr std::chrono::seconds kPatience(5);
     constexpr std::chrono::milliseconds kSettled(300);
+    constexpr std::chrono::milliseconds kSettledWithoutOdometry(2000);
     const auto begin = Clock::now();
     auto changed = begin;
     std::uint32_t listeners = 0;
@@ -79,7 +81,8 @@ class Publication {
       const std::uint32_t found = publisher_.num_readers();
       if (found != listeners) changed = now;
       listeners = found;
-      if (listeners > 0 && now - changed > kSettled) return;
+      const auto settled = follower_.sees_odometry() ? kSettled : kSettledWithoutOdometry;
+      if (listeners > 0 && now - changed > settled) return;
       if (listeners == 0 && now - begin > kPatience) {
         spdlog::warn("nobody listens after {} s; publishing all the same", kPatience.count());
         return;

@@ -24,6 +24,9 @@ class VoFollower {
   static Result<VoFollower> open(const bridge::Participant& participant, Numbering numbering,
                                  std::uint64_t ahead);
 
+  /// Whether an odometry process is on the bus now, busy or not.
+  bool sees_odometry() const { return reader_.num_writers() > 0; }
+
   /// Waits until frame `sequence` may be published, or `stop` says so. When nothing was heard for
   /// five seconds it says so in the log and holds nothing back until the odometry is heard again.
   void wait_before(std::uint64_t sequence, const std::function<bool()>& stop);

@@ -123,6 +123,41 @@ TEST_F(RecordedFramesTest, PairsImagesOfTwoTopicsAndGivesLateOnesAlone) {
   EXPECT_NEAR(results[0].frame.pair_error_s, 0.001, 1e-9);
 }
 
+TEST_F(RecordedFramesTest, BeginAnewAfterARewind) {
+  put_infos("/cam0", "/cam1");
+  for (int i = 0; i < 3; ++i) {
+    put_image("/cam0/image_raw", i * kPeriod, i);
+    if (i != 0) put_image("/cam1/image_raw", i * kPeriod, i);
+  }
+  ASSERT_TRUE(writer_->close().ok());
+  auto recording = require(Recording::open((folder_ / "bag.mcap").string()));
+  const auto frames = require(RecordedFrames::open(*recording, {}));
+  for (const int before : {1, 3, 0}) {
+    frames->rewind();
+    for (int i = 0; i < before; ++i) EXPECT_EQ(frames->next().state, SourceState::kFrame);
+    frames->rewind();
+    for (int i = 0; i < 3; ++i) {
+      const SourceResult next = frames->next();
+      ASSERT_EQ(next.state, SourceState::kFrame) << next.message;
+      EXPECT_EQ(next.frame.stamp_ns, i * kPeriod);
+      EXPECT_EQ(next.frame.right.valid, i != 0);
+    }
+    EXPECT_EQ(frames->next().state, SourceState::kEndOfStream);
+  }
+}
+
+TEST_F(RecordedFramesTest, ATopicThatIsNamedAndNotThereIsSaid) {
+  put_infos("/cam0", "/cam1");
+  put_image("/cam0/image_raw", 0, 1);
+  put_image("/cam1/image_raw", 0, 1);
+  ASSERT_TRUE(writer_->close().ok());
+  auto recording = require(Recording::open((folder_ / "bag.mcap").string()));
+  const auto refused = RecordedFrames::open(*recording, {"/cam7/image_raw", "/cam1/image_raw"});
+  ASSERT_FALSE(refused.ok());
+  EXPECT_NE(refused.error().find("/cam7/image_raw"), std::string::npos) << refused.error();
+  EXPECT_EQ(refused.error().find("StereoFrame"), std::string::npos) << refused.error();
+}
+
 TEST_F(RecordedFramesTest, CompressedImagesDoWhenThereAreNoOthers) {
   put_infos("/rig/left", "/rig/right");
   put_jpeg("/rig/left/image_raw/compressed", kPeriod);

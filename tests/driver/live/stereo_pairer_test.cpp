@@ -58,6 +58,20 @@ TEST(StereoPairer, ALostImageNeverPairsItsNeighbour) {
   EXPECT_EQ(pairer.counts().unpaired_right, 1U);
 }
 
+TEST(StereoPairer, OfTwoWithinTheToleranceTheNearerIsTaken) {
+  for (const std::int64_t nearer : {-2000, 2000}) {
+    StereoPairer pairer(kPeriod / 4);
+    pairer.add(CameraSide::kRight, image(-5000));
+    pairer.add(CameraSide::kRight, image(nearer));
+    pairer.add(CameraSide::kLeft, image(0));
+    const auto pairs = drain(&pairer);
+    ASSERT_EQ(pairs.size(), 1U);
+    ASSERT_TRUE(pairs[0].right);
+    EXPECT_EQ(pairs[0].right->time_ns, nearer);
+    EXPECT_EQ(pairer.counts().unpaired_right, 1U);
+  }
+}
+
 TEST(StereoPairer, OneSideGoesOnWithoutTheOther) {
   StereoPairer pairer(kPeriod / 4, 3);
   std::size_t given = 0;

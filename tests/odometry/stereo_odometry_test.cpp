@@ -2,8 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cstring>
-
 #include "odometry/odometry_test_support.h"
 
 namespace sovo {
@@ -77,7 +75,7 @@ TEST(StereoOdometry, RepeatedRunIsTheSameToTheLastBitWithOneThreadOrTwo) {
     for (std::size_t i = 0; i < results[0].size(); ++i) {
       const Mat4 a = results[0][i].T_odom_left.matrix();
       const Mat4 b = results[k][i].T_odom_left.matrix();
-      EXPECT_EQ(std::memcmp(a.data(), b.data(), sizeof(double) * 16), 0) << "pose " << i;
+      EXPECT_EQ(a, b) << "pose " << i;
     }
   }
 }

@@ -138,7 +138,7 @@ void give_way() {
   (void)setpriority(PRIO_PROCESS, 0, kNiceness);
 }
 
-int run(const AppConfig& config, bool open) {
+int run_dashboard(const AppConfig& config, bool open) {
   give_way();
   auto settings = server_config(config.dashboard);
   if (!settings) return fail(kUsage, settings.error());
@@ -182,7 +182,7 @@ void add_dashboard_command(const Command& program) {
             "Let clients with the token reset, pause and record");
   command.action([options, open] {
     const auto config = options->load();
-    return config ? run(*config, *open) : fail(kUsage, config.error());
+    return config ? run_dashboard(*config, *open) : fail(kUsage, config.error());
   });
 }
 

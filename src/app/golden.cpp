@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json to_json(const GoldenFrame& frame) {
+Json frame_to_json(const GoldenFrame& frame) {
   Json json = {{"stamp_ns", frame.stamp_ns}, {"state", frame.state}};
   if (!frame.pose_valid) return json;
   const Vec3& t = frame.T_odom_left.translation();
@@ -78,7 +78,7 @@ std::string to_json(const Golden& golden) {
                  {"rotation_rad", golden.tolerances.rotation_rad},
                  {"log_scale", golden.tolerances.log_scale}}}};
   Json frames = Json::array();
-  for (const GoldenFrame& frame : golden.frames) frames.push_back(to_json(frame));
+  for (const GoldenFrame& frame : golden.frames) frames.push_back(frame_to_json(frame));
   json["frames"] = std::move(frames);
   return json.dump(1) + "\n";
 }

@@ -43,7 +43,7 @@ bool feed(FrameSource& source, OdometrySession& session, StopSignal& stop) {
   return true;
 }
 
-int run(AppConfig config, bool simulated) {
+int run_odometry(AppConfig config, bool simulated) {
   const bool recorded = !simulated && !config.camera.mcap.empty();
   if (!simulated && !recorded && config.camera.path.empty()) {
     return fail(kUsage,
@@ -86,7 +86,7 @@ void add_run_command(const Command& program) {
   add_odometry_options(*options);
   command.action([options] {
     const auto config = options->load();
-    return config ? run(*config, options->is_given("--world")) : fail(kUsage, config.error());
+    return config ? run_odometry(*config, options->is_given("--world")) : fail(kUsage, config.error());
   });
 }
 

@@ -219,7 +219,7 @@ Result<std::unique_ptr<bridge::StereoFeed>> open_source(const AppConfig& config,
   return Source(std::move(*source));
 }
 
-int run(const AppConfig& config) {
+int serve(const AppConfig& config) {
   if (auto writable = check_outputs(config.output); !writable) {
     return fail(kUsage, writable.error());
   }
@@ -267,7 +267,7 @@ void add_vo_command(const Command& program) {
   add_dds_options(*options);
   command.action([options] {
     const auto config = options->load();
-    return config ? run(*config) : fail(kUsage, config.error());
+    return config ? serve(*config) : fail(kUsage, config.error());
   });
 }
 

@@ -15,7 +15,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMostKnownIds = 1024;
+constexpr std::size_t kMostRecordedIds = 1024;
 constexpr std::size_t kLongestName = 100;
 constexpr char kExtension[] = ".mcap";
 
@@ -107,7 +107,7 @@ void Recorder::obey(const msg::RecorderCommand& command) {
   using Traits = MessageTraits<msg::RecorderCommand>;
   if (std::find(known_ids_.begin(), known_ids_.end(), command.id) != known_ids_.end()) return;
   known_ids_.push_back(command.id);
-  if (known_ids_.size() > kMostKnownIds) known_ids_.pop_front();
+  if (known_ids_.size() > kMostRecordedIds) known_ids_.pop_front();
   last_command_id_ = command.id;
   refusal_.clear();
   next_status_ = {};  // the answer goes out at once

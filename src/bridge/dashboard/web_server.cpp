@@ -9,18 +9,17 @@
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core.hpp>
 #include <boost/beast/http.hpp>
-#include <boost/beast/ssl.hpp>
 #include <boost/beast/websocket.hpp>
-#include <boost/beast/websocket/ssl.hpp>
 #include <chrono>
 #include <optional>
 #include <set>
 #include <thread>
 #include <utility>
 
+#include "sovo/bridge/dashboard/web_stream.h"
 #include "sovo/io/text.h"
 
-// The only file that sees Boost.Beast: it takes the compiler half a minute.
+// The only file that sees Boost.Beast, with web_stream.h: it takes the compiler half a minute.
 
 namespace sovo::bridge {
 namespace {
@@ -98,18 +97,17 @@ class ConnectionCount {
 };
 
 /// A WebSocket: reads until it ends, writes one message at a time when there is one.
-template <class Stream>
 class WebSocketConnection : public WebSocketHandle,
-                            public std::enable_shared_from_this<WebSocketConnection<Stream>> {
+                            public std::enable_shared_from_this<WebSocketConnection> {
  public:
-  WebSocketConnection(Stream stream, Context& context, WebUpgrade upgrade, ConnectionCount count)
+  WebSocketConnection(WebStream stream, Context& context, WebUpgrade upgrade, ConnectionCount count)
       : socket_(std::move(stream)),
         context_(context),
         upgrade_(std::move(upgrade)),
         count_(std::move(count)) {}
 
   void start(const Request& request) {
-    beast::get_lowest_layer(socket_).expires_never();
+    socket_.next_layer().tcp().expires_never();
     auto timeout = websocket::stream_base::timeout::suggested(beast::role_type::server);
     timeout.idle_timeout = std::chrono::seconds(60);
     timeout.keep_alive_pings = true;
@@ -119,7 +117,7 @@ class WebSocketConnection : public WebSocketHandle,
     socket_.set_option(websocket::stream_base::decorator([this](websocket::response_type& r) {
       r.set(http::field::sec_websocket_protocol, upgrade_.subprotocol);
     }));
-    socket_.async_accept(request, [self = this->shared_from_this()](error_code error) {
+    socket_.async_accept(request, [self = shared_from_this()](error_code error) {
       if (error) return;
       self->context_.clients.insert(self->upgrade_.client);
       self->upgrade_.client->opened(self);
@@ -129,7 +127,7 @@ class WebSocketConnection : public WebSocketHandle,
 
   void wake() override {
     if (waking_.exchange(true)) return;
-    asio::post(context_.io, [self = this->shared_from_this()] {
+    asio::post(context_.io, [self = shared_from_this()] {
       self->waking_ = false;
       self->write();
     });
@@ -137,7 +135,7 @@ class WebSocketConnection : public WebSocketHandle,
 
  private:
   void read() {
-    socket_.async_read(buffer_, [self = this->shared_from_this()](error_code error, std::size_t) {
+    socket_.async_read(buffer_, [self = shared_from_this()](error_code error, std::size_t) {
       if (error) return self->end();
       const auto data = self->buffer_.data();
       const auto* bytes = static_cast<const std::uint8_t*>(data.data());
@@ -158,7 +156,7 @@ class WebSocketConnection : public WebSocketHandle,
     closing_ = true;
     forget();
     socket_.async_close(websocket::close_code::protocol_error,
-                        [self = this->shared_from_this()](error_code) { self->end(); });
+                        [self = shared_from_this()](error_code) { self->end(); });
   }
 
   void write() {
@@ -171,7 +169,7 @@ class WebSocketConnection : public WebSocketHandle,
     const std::array<asio::const_buffer, 2> parts = {
         asio::buffer(frame_.head),
         frame_.payload ? asio::buffer(*frame_.payload) : asio::const_buffer()};
-    socket_.async_write(parts, [self = this->shared_from_this()](error_code error, std::size_t) {
+    socket_.async_write(parts, [self = shared_from_this()](error_code error, std::size_t) {
       self->writing_ = false;
       if (error) return self->end();
       self->write();
@@ -185,10 +183,10 @@ class WebSocketConnection : public WebSocketHandle,
   void end() {
     if (std::exchange(ended_, true)) return;
     forget();
-    beast::get_lowest_layer(socket_).cancel();
+    socket_.next_layer().tcp().cancel();
   }
 
-  websocket::stream<Stream> socket_;
+  websocket::stream<WebStream> socket_;
   Context& context_;
   WebUpgrade upgrade_;
   ConnectionCount count_;
@@ -201,24 +199,17 @@ class WebSocketConnection : public WebSocketHandle,
 };
 
 /// Requests of one connection, one after another, until it becomes a WebSocket or ends.
-template <class Stream>
-class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream>> {
+class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
  public:
-  static constexpr bool kTls = !std::is_same_v<Stream, beast::tcp_stream>;
-
-  HttpConnection(Stream stream, Context& context)
+  HttpConnection(WebStream stream, Context& context)
       : stream_(std::move(stream)), context_(context), count_(context) {}
 
   void start() {
-    if constexpr (kTls) {
-      beast::get_lowest_layer(stream_).expires_after(kRequestTimeout);
-      stream_.async_handshake(ssl::stream_base::server,
-                              [self = this->shared_from_this()](error_code error) {
-                                if (!error) self->read();
-                              });
-    } else {
-      read();
-    }
+    if (!stream_.has_tls()) return read();
+    stream_.tcp().expires_after(kRequestTimeout);
+    stream_.async_handshake([self = shared_from_this()](error_code error) {
+      if (!error) self->read();
+    });
   }
 
  private:
@@ -226,39 +217,37 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
     parser_.emplace();
     parser_->header_limit(kMaxHeaderBytes);
     parser_->body_limit(kMaxBodyBytes);
-    beast::get_lowest_layer(stream_).expires_after(kRequestTimeout);
+    stream_.tcp().expires_after(kRequestTimeout);
     http::async_read(stream_, buffer_, *parser_,
-                     [self = this->shared_from_this()](error_code error, std::size_t) {
+                     [self = shared_from_this()](error_code error, std::size_t) {
                        if (!error) self->answer();
                      });
   }
 
   void answer() {
     const Request& request = parser_->get();
-    const WebRequest asked = to_request(request, kTls);
+    const WebRequest asked = to_request(request, stream_.has_tls());
     if (!websocket::is_upgrade(request)) return write(context_.handler.respond(asked));
     auto decision = context_.handler.upgrade(asked);
     if (auto* refusal = std::get_if<WebResponse>(&decision)) return write(std::move(*refusal));
-    std::make_shared<WebSocketConnection<Stream>>(
+    std::make_shared<WebSocketConnection>(
         std::move(stream_), context_, std::get<WebUpgrade>(std::move(decision)), std::move(count_))
         ->start(request);
   }
 
   void write(WebResponse answer) {
     response_ = to_response(std::move(answer), parser_->get());
-    beast::get_lowest_layer(stream_).expires_after(kRequestTimeout);
+    stream_.tcp().expires_after(kRequestTimeout);
     http::async_write(stream_, response_,
-                      [self = this->shared_from_this()](error_code error, std::size_t) {
+                      [self = shared_from_this()](error_code error, std::size_t) {
                         if (error) return;
                         if (self->response_.keep_alive()) return self->read();
                         error_code ignored;
-                        beast::get_lowest_layer(self->stream_)
-                            .socket()
-                            .shutdown(tcp::socket::shutdown_send, ignored);
+                        self->stream_.tcp().socket().shutdown(tcp::socket::shutdown_send, ignored);
                       });
   }
 
-  Stream stream_;
+  WebStream stream_;
   Context& context_;
   ConnectionCount count_;
   beast::flat_buffer buffer_;
@@ -354,13 +343,8 @@ class WebServer::Impl {
     socket.set_option(tcp::no_delay(true), ignored);
     // What the kernel keeps for a stalled client is not under this program's rule of what to drop.
     socket.set_option(asio::socket_base::send_buffer_size(512 << 10), ignored);
-    beast::tcp_stream stream(std::move(socket));
-    if (tls_) {
-      using Stream = beast::ssl_stream<beast::tcp_stream>;
-      std::make_shared<HttpConnection<Stream>>(Stream(std::move(stream), *tls_), context_)->start();
-    } else {
-      std::make_shared<HttpConnection<beast::tcp_stream>>(std::move(stream), context_)->start();
-    }
+    WebStream stream = tls_ ? WebStream(std::move(socket), *tls_) : WebStream(std::move(socket));
+    std::make_shared<HttpConnection>(std::move(stream), context_)->start();
   }
 
   Context context_;

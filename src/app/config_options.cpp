@@ -10,9 +10,11 @@ namespace {
 
 std::vector<std::string> preset_assignments(Preset preset) {
   if (preset == Preset::kDefault) return {};
-  if (preset == Preset::kQuality) return {"vo.window.max_iterations=10"};
-  return {"vo.points.active_points=800", "vo.points.immature_points=600",
-          "vo.keyframe.max_keyframes=6", "vo.keyframe.min_keyframes=4",
+  if (preset == Preset::kQuality) {
+    return {"vo.points.immature_points=700", "vo.window.max_iterations=10"};
+  }
+  return {"vo.points.active_points=800", "vo.points.immature_points=250",
+          "vo.keyframe.max_keyframes=5", "vo.keyframe.min_keyframes=4",
           "vo.window.max_iterations=4"};
 }
 

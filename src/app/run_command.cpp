@@ -86,7 +86,8 @@ void add_run_command(const Command& program) {
   add_odometry_options(*options);
   command.action([options] {
     const auto config = options->load();
-    return config ? run_odometry(*config, options->is_given("--world")) : fail(kUsage, config.error());
+    return config ? run_odometry(*config, options->is_given("--world"))
+                  : fail(kUsage, config.error());
   });
 }
 

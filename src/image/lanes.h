@@ -20,7 +20,8 @@
 
 namespace sovo {
 
-/// Lanes: floats that the compiler keeps in one register, four (SSE, NEON) or eight (AVX2): GCC's
+/// Lanes: floats that the compiler keeps in one register, four (SSE, NEON) or eight (AVX2, and
+/// AVX-512, which has twice the registers, masks, and eight doubles in one): GCC's
 /// vector extension, so that one source serves every machine and each lane computes exactly what
 /// scalar code would. Sums over eight lanes are those over four of their halves, so that every
 /// machine gives the same bits.
@@ -37,12 +38,14 @@ using WideLaneMask = std::int32_t __attribute__((vector_size(32)));
 /// compiled for them and functions that are not: none of these may be called.
 #define SOVO_LANE_FUNCTION [[gnu::always_inline]] inline
 
-/// Compiled for processors that have registers of eight lanes.
+/// Compiled for processors that have registers of eight lanes, and for those with AVX-512.
 #if defined(__x86_64__)
 #define SOVO_WIDE_FUNCTION [[gnu::target("avx2")]]
+#define SOVO_AVX512_FUNCTION [[gnu::target("avx512f,avx512bw,avx512dq,avx512vl")]]
 inline constexpr bool kMayHaveWideLanes = true;
 #else
 #define SOVO_WIDE_FUNCTION
+#define SOVO_AVX512_FUNCTION
 inline constexpr bool kMayHaveWideLanes = false;
 #endif
 
@@ -50,6 +53,16 @@ inline constexpr bool kMayHaveWideLanes = false;
 inline bool has_wide_lanes() {
 #if defined(__x86_64__)
   return __builtin_cpu_supports("avx2") != 0;
+#else
+  return false;
+#endif
+}
+
+/// Whether it has AVX-512, as server processors of Intel since 2017 and AMD's since Zen 4.
+inline bool has_avx512() {
+#if defined(__x86_64__)
+  return __builtin_cpu_supports("avx512vl") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
+         __builtin_cpu_supports("avx512bw") != 0;
 #else
   return false;
 #endif
@@ -67,10 +80,17 @@ SOVO_WIDE_FUNCTION auto run_wide(const Args&... args) {
   return Kernel::template run<WideLane>(args...);
 }
 
-/// In the widest lanes that this processor has.
+/// And with AVX-512; only where `has_avx512`.
+template <class Kernel, class... Args>
+SOVO_AVX512_FUNCTION auto run_avx512(const Args&... args) {
+  return Kernel::template run<WideLane>(args...);
+}
+
+/// With the best that this processor has.
 template <class Kernel, class... Args>
 auto run_kernel(const Args&... args) {
   if constexpr (kMayHaveWideLanes) {
+    if (has_avx512()) return run_avx512<Kernel>(args...);
     if (has_wide_lanes()) return run_wide<Kernel>(args...);
   }
   return run_narrow<Kernel>(args...);

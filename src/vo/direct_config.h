@@ -63,7 +63,7 @@ struct KeyframeConfig {
 /// Immature points: selection, epipolar tracing, activation.
 struct PointConfig {
   int active_points = 2000;   ///< In the window.
-  int immature_points = 700;  ///< Selected a keyframe.
+  int immature_points = 500;  ///< Selected a keyframe.
   double max_search = 0.027;  ///< Of width + height: longest epipolar search.
   double huber = 9.0;
   double outlier_energy = 144.0;  ///< A pixel of the pattern; grey levels squared.
@@ -98,6 +98,7 @@ struct WindowConfig {
   double depth_damping = 100.0;            ///< Added to H_rho * mean_rho^2 of every point.
   double min_parallax = 2.0;               ///< Below it stereo depths stand against steps [px].
   double stop_threshold = 1.2;             ///< Times the step norms below which iteration stops.
+  double resample_px = 0.02;               ///< Motion of a pattern above which it is sampled anew.
   double prior_a = 1e4;                    ///< Weight of the prior on each frame's log-gain.
   double prior_b = 1.0;                    ///< The same for the bias.
   double min_relative_information = 50.0;  ///< H_rho * mean_rho^2 of a point to be marginalized.
@@ -117,6 +118,8 @@ struct WindowConfig {
     v("min_parallax", min_parallax,
       "with less, what a stereo match tells of a point's depth damps its steps [px]");
     v("stop_threshold", stop_threshold, "iteration stops below this x the step thresholds");
+    v("resample_px", resample_px,
+      "patterns that moved by less since they were sampled are not sampled again [px]; 0: always");
     v("prior_a", prior_a, "weight of the prior on each frame's log-gain");
     v("prior_b", prior_b, "weight of the prior on each frame's bias");
     v("min_relative_information", min_relative_information,

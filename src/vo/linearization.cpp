@@ -13,6 +13,19 @@ namespace {
 /// Index of (i, j), i <= j, in the upper triangle of a 4x4 matrix stored by rows.
 constexpr int tri(int i, int j) { return i * 4 - i * (i - 1) / 2 + (j - i); }
 
+/// A row of the Gram matrix times a vector.
+template <class T>
+T gram_row(const std::array<float, 10>& gram, std::size_t row, const std::array<T, 4>& d) {
+  T sum = 0;
+  for (std::size_t j = 0; j < 4; ++j) {
+    const int i = static_cast<int>(row);
+    const int k = static_cast<int>(j);
+    sum +=
+        static_cast<T>(gram[static_cast<std::size_t>(tri(std::min(i, k), std::max(i, k)))]) * d[j];
+  }
+  return sum;
+}
+
 /// Sum of squared gradients below which a pattern says nothing.
 constexpr float kMinGradientEnergy = 2.0F;
 
@@ -154,6 +167,31 @@ DepthPart depth_part(const LinearizedResidual& r) {
           r.du_rho * r.gram_r[0] + r.dv_rho * r.gram_r[1]};
 }
 
+PatternShift pattern_shift(const LinearizedResidual& sampled, const std::array<float, 8>& moved,
+                           float rho_change) {
+  const auto sum = [&](const std::array<float, 8>& d) {
+    return sum_lane(load_lane(&d[0]) * load_lane(&moved[0]) +
+                    load_lane(&d[4]) * load_lane(&moved[4]));
+  };
+  return {sum(sampled.du) + sampled.du_rho * rho_change,
+          sum(sampled.dv) + sampled.dv_rho * rho_change, moved[6], moved[7]};
+}
+
+void move_residual(const PatternShift& shift, LinearizedResidual* residual) {
+  LinearizedResidual& r = *residual;
+  const std::array<float, 4> d = {shift.u, shift.v, shift.a, shift.b};
+  float change = 0.0F;  // of the energy, whose slope is 2 J^T r also where Huber's norm is linear
+  for (std::size_t i = 0; i < 4; ++i) {
+    const float moved = gram_row(r.gram, i, d);
+    change += d[i] * (2.0F * r.gram_r[i] + moved);
+    r.gram_r[i] += moved;
+  }
+  r.rr = std::max(0.0F, r.rr + change);
+  r.raw_energy = std::max(0.0F, r.raw_energy + change);
+  r.centre_u += shift.u;
+  r.centre_v += shift.v;
+}
+
 void shift_residual(const Vec8& x, LinearizedResidual* residual) {
   LinearizedResidual& r = *residual;
   double u = 0.0;
@@ -162,15 +200,9 @@ void shift_residual(const Vec8& x, LinearizedResidual* residual) {
     u += r.du[k] * x[static_cast<Eigen::Index>(k)];
     v += r.dv[k] * x[static_cast<Eigen::Index>(k)];
   }
-  const double d[4] = {u, v, x[6], x[7]};
-  for (int i = 0; i < 4; ++i) {
-    double sum = 0.0;
-    for (int j = 0; j < 4; ++j) {
-      sum += static_cast<double>(
-                 r.gram[static_cast<std::size_t>(tri(std::min(i, j), std::max(i, j)))]) *
-             d[j];
-    }
-    r.gram_r[static_cast<std::size_t>(i)] -= static_cast<float>(sum);
+  const std::array<double, 4> d = {u, v, x[6], x[7]};
+  for (std::size_t i = 0; i < 4; ++i) {
+    r.gram_r[i] -= static_cast<float>(gram_row(r.gram, i, d));
   }
 }
 

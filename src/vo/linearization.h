@@ -74,6 +74,20 @@ struct DepthPart {
 };
 DepthPart depth_part(const LinearizedResidual& residual);
 
+/// How a pattern has moved since it was sampled, to first order: its centre in the target image
+/// [px], and the brightness between its keyframes.
+struct PatternShift {
+  float u = 0.0F, v = 0.0F, a = 0.0F, b = 0.0F;
+};
+
+/// By the relative displacement of its keyframes (8) and the change of its inverse depth.
+PatternShift pattern_shift(const LinearizedResidual& sampled, const std::array<float, 8>& moved,
+                           float rho_change);
+
+/// The residual as it would be, to first order, if it were sampled where its pattern is now: J is
+/// as it was, r is r + J x.
+void move_residual(const PatternShift& shift, LinearizedResidual* residual);
+
 /// r - J x for the displacement `x` (8, relative): changes `gram_r` so that later accumulation sees
 /// the residual as it would be at the linearization point of the poses.
 void shift_residual(const Vec8& x, LinearizedResidual* residual);

@@ -72,7 +72,7 @@ struct AddPoint {
   SOVO_LANE_FUNCTION static int run(const PointResiduals& point, LaneBlock* top, LaneBlock* schur) {
     int count = 0;
     for (const TargetResidual* i = point.begin; i != point.end; ++i) {
-      const LinearizedResidual& r = i->linearized;
+      const LinearizedResidual& r = *i->linearized;
       if (r.state != ResidualState::kIn) continue;
       ++count;
       add_relative<F>(r, &top[i->target]);
@@ -85,9 +85,9 @@ struct AddPoint {
         store_lane(F(load_lane<F>(&own.b[c]) + point.gradient * lanes), &own.b[c]);
       }
       for (const TargetResidual* j = point.begin; j <= i; ++j) {
-        if (j->linearized.state != ResidualState::kIn) continue;
+        if (j->linearized->state != ResidualState::kIn) continue;
         // The earlier target is the row.
-        add_outer_product<F>(j->linearized.cross.data(), scaled,
+        add_outer_product<F>(j->linearized->cross.data(), scaled,
                              &schur[block_of(j->target, i->target)]);
       }
     }

@@ -39,7 +39,7 @@ constexpr std::size_t block_of(int a, int b) {
 /// A residual of the point being added, into the keyframe with index `target`.
 struct TargetResidual {
   int target = 0;
-  LinearizedResidual linearized;
+  const LinearizedResidual* linearized = nullptr;
 };
 
 /// Sums over a few points of one host, in coordinates relative to each target (pose, a, b of the

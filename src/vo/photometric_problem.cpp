@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "sovo/image/lanes.h"
 #include "sovo/vo/linearization.h"
 
 namespace sovo {
@@ -31,6 +32,17 @@ void store(const LinearizedResidual& r, StoredResidual* out) {
   out->depth = depth_part(r);
   out->state = r.state;
   out->textured = is_textured(r);
+}
+
+/// In single precision, as residuals want them.
+std::vector<std::array<float, 8>> rounded(const std::vector<Vec8>& displacements) {
+  std::vector<std::array<float, 8>> out(displacements.size());
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    for (std::size_t k = 0; k < 8; ++k) {
+      out[i][k] = static_cast<float>(displacements[i][static_cast<Eigen::Index>(k)]);
+    }
+  }
+  return out;
 }
 
 }  // namespace
@@ -78,6 +90,7 @@ PhotometricProblem::PhotometricProblem(const WindowConfig& config, std::vector<P
     blocks_.back().end = i + 1;
   }
   sums_.resize(blocks_.size());
+  sampled_.resize(first_.back());
 }
 
 /// A pixel of parallax or less is lost in blur, and in what else moves all points of an image
@@ -118,11 +131,34 @@ WindowLinearization PhotometricProblem::stored() const {
   return out;
 }
 
+void PhotometricProblem::remember_poses() {
+  states_.push_back(window_->stacked_x());
+  moved_.resize(states_.size());
+  for (std::size_t i = 0; i < states_.size(); ++i) {
+    moved_[i] = rounded(relative_displacements(*window_, states_.back() - states_[i]));
+  }
+}
+
+/// Whether a residual may be taken along its Jacobian from where it was sampled, and how far.
+bool PhotometricProblem::is_settled(const Block& block, std::size_t point, std::size_t residual,
+                                    int target, PatternShift* shift) const {
+  const SampledResidual& at = sampled_[residual];
+  if (at.linearization < 0 || config_.resample_px <= 0.0) return false;
+  const auto rho_change = static_cast<float>(points_[point].point->rho - at.rho);
+  *shift = pattern_shift(
+      at.linearized,
+      moved_[static_cast<std::size_t>(at.linearization)][pair_index(block.host, target)],
+      rho_change);
+  const auto limit = static_cast<float>(config_.resample_px);
+  return shift->u * shift->u + shift->v * shift->v <= limit * limit;
+}
+
 void PhotometricProblem::linearize_block(const Block& block, const WindowLinearization& known,
                                          const Request& request, WindowLinearization* out,
-                                         HostSums* sums, double* energy) const {
-  std::array<PatternProjection, kAhead * kMaxSlots> projections;
+                                         HostSums* sums, double* energy) {
+  std::array<Step, kAhead * kMaxSlots> steps;
   std::array<TargetResidual, kMaxSlots> residuals;
+  std::array<LinearizedResidual, kMaxSlots> moved;
   const auto wanted = [&](std::size_t k) {
     return (request.targets >> known.residuals[k].target & 1U) != 0;
   };
@@ -130,33 +166,30 @@ void PhotometricProblem::linearize_block(const Block& block, const WindowLineari
   *energy = 0.0;
   for (std::size_t begin = block.begin; begin < block.end; begin += kAhead) {
     const std::size_t end = std::min(block.end, begin + kAhead);
-    PatternProjection* projection = projections.data();
+    Step* step = steps.data();
     for (std::size_t i = begin; i < end; ++i) {
       for (std::size_t k = first_[i]; k < first_[i + 1]; ++k) {
-        if (!wanted(k)) continue;
-        const int target = known.residuals[k].target;
-        project_pattern(*window_, block.host, target, *points_[i].point, projection);
-        prefetch_pattern(*window_, target, *projection++);
+        if (wanted(k)) prepare(block, i, k, known.residuals[k].target, step++);
       }
     }
-    projection = projections.data();
+    step = steps.data();
     for (std::size_t i = begin; i < end; ++i) {
       std::size_t count = 0;
       PointDepth depth;
       for (std::size_t k = first_[i]; k < first_[i + 1]; ++k) {
         if (!wanted(k)) continue;
-        TargetResidual& r = residuals[count++];
-        r.target = known.residuals[k].target;
-        *energy +=
-            linearize_projected(*window_, config_, block.host, r.target, *points_[i].point,
-                                known_residual(known.residuals[k]), *projection++, &r.linearized);
-        if (r.linearized.state == ResidualState::kIn) {
-          if (request.at_frozen_poses) {
-            shift_residual(shifts_[pair_index(block.host, r.target)], &r.linearized);
-          }
+        const int target = known.residuals[k].target;
+        const LinearizedResidual* r =
+            evaluate(block, i, k, known.residuals[k], *step++, &moved[count]);
+        *energy += static_cast<double>(r->energy);
+        if (r->state == ResidualState::kIn && request.at_frozen_poses) {
+          moved[count] = *r;
+          shift_residual(shifts_[pair_index(block.host, target)], &moved[count]);
+          r = &moved[count];
         }
-        store(r.linearized, &out->residuals[k]);
+        store(*r, &out->residuals[k]);
         depth.add(out->residuals[k]);
+        residuals[count++] = {target, r};
       }
       out->depths[i] = depth;
       if (request.system) {
@@ -168,11 +201,44 @@ void PhotometricProblem::linearize_block(const Block& block, const WindowLineari
   }
 }
 
+void PhotometricProblem::prepare(const Block& block, std::size_t point, std::size_t residual,
+                                 int target, Step* step) const {
+  step->settled = is_settled(block, point, residual, target, &step->shift);
+  if (step->settled) return;
+  project_pattern(*window_, block.host, target, *points_[point].point, &step->projection);
+  prefetch_pattern(*window_, target, step->projection);
+}
+
+const LinearizedResidual* PhotometricProblem::evaluate(const Block& block, std::size_t point,
+                                                       std::size_t residual,
+                                                       const StoredResidual& known,
+                                                       const Step& step,
+                                                       LinearizedResidual* moved) {
+  SampledResidual& at = sampled_[residual];
+  if (step.settled) {
+    *moved = at.linearized;
+    move_residual(step.shift, moved);
+    const Verdict verdict = judge((*window_)[block.host], (*window_)[known.target],
+                                  moved->raw_energy, is_textured(*moved));
+    moved->state = verdict.state;
+    moved->energy = verdict.energy;
+    return moved;
+  }
+  const Point& p = *points_[point].point;
+  linearize_projected(*window_, config_, block.host, known.target, p, known_residual(known),
+                      step.projection, &at.linearized);
+  at.rho = p.rho;
+  const bool in_view = at.linearized.state != ResidualState::kOutOfView;
+  at.linearization = in_view ? static_cast<int>(states_.size()) - 1 : -1;
+  return &at.linearized;
+}
+
 void PhotometricProblem::linearize(const WindowLinearization& known, const Request& request,
                                    WindowLinearization* out) {
   if (out->residuals.size() != known.residuals.size()) *out = known;
   std::vector<double> energies(blocks_.size());
-  if (request.at_frozen_poses) shifts_ = relative_displacements(*window_, window_->stacked_x());
+  remember_poses();
+  if (request.at_frozen_poses) shifts_ = relative_displacements(*window_, states_.back());
   pool_->run(static_cast<int>(blocks_.size()), [&](int i) {
     const auto k = static_cast<std::size_t>(i);
     linearize_block(blocks_[k], known, request, out, &sums_[k], &energies[k]);
@@ -208,13 +274,7 @@ void PhotometricProblem::reclassify(WindowLinearization* at) const {
 }
 
 void PhotometricProblem::step_depths(const WindowLinearization& at, const VecX& dx, double lambda) {
-  const std::vector<Vec8> relative = relative_displacements(*window_, dx);
-  std::vector<std::array<float, 8>> steps(relative.size());
-  for (std::size_t i = 0; i < relative.size(); ++i) {
-    for (std::size_t k = 0; k < 8; ++k) {
-      steps[i][k] = static_cast<float>(relative[i][static_cast<Eigen::Index>(k)]);
-    }
-  }
+  const auto steps = rounded(relative_displacements(*window_, dx));
   for (const Block& block : blocks_) {
     for (std::size_t i = block.begin; i < block.end; ++i) {
       const PointDepth& depth = at.depths[i];

@@ -39,6 +39,13 @@ struct alignas(64) StoredResidual {
 };
 static_assert(sizeof(StoredResidual) == 64);
 
+/// A residual as it was last sampled.
+struct SampledResidual {
+  LinearizedResidual linearized;
+  double rho = 0.0;        ///< Inverse depth of its point then.
+  int linearization = -1;  ///< Which one that was; -1: none, or out of view.
+};
+
 /// A point's own H_rho_rho and b_rho.
 struct PointDepth {
   double hessian = 0.0, gradient = 0.0;
@@ -79,7 +86,10 @@ class PhotometricProblem {
     std::uint32_t targets = std::numeric_limits<std::uint32_t>::max();
   };
 
-  /// Linearizes at the present estimate. `known`: states so far; what is out of view stays so.
+  /// Linearizes at the present estimate. `known`: states so far; what is out of view stays so. A
+  /// residual is sampled again where its pattern has moved by more than `resample_px` since it was;
+  /// otherwise it is taken along its own Jacobian. Between the older keyframes little moves in one
+  /// bundle adjustment, and sampling is most of the work.
   void linearize(const WindowLinearization& known, const Request& request,
                  WindowLinearization* out);
 
@@ -101,8 +111,22 @@ class PhotometricProblem {
     std::size_t begin = 0, end = 0;  ///< Points.
   };
   void add_damping(const PointRef& ref, double depth_damping);
+  /// What is known of a residual before it is evaluated.
+  struct Step {
+    bool settled = false;  ///< Not to be sampled.
+    PatternShift shift;    ///< Of a settled one.
+    PatternProjection projection;
+  };
+  void remember_poses();
+  bool is_settled(const Block& block, std::size_t point, std::size_t residual, int target,
+                  PatternShift* shift) const;
+  void prepare(const Block& block, std::size_t point, std::size_t residual, int target,
+               Step* step) const;
+  const LinearizedResidual* evaluate(const Block& block, std::size_t point, std::size_t residual,
+                                     const StoredResidual& known, const Step& step,
+                                     LinearizedResidual* moved);
   void linearize_block(const Block& block, const WindowLinearization& known, const Request& request,
-                       WindowLinearization* out, HostSums* sums, double* energy) const;
+                       WindowLinearization* out, HostSums* sums, double* energy);
 
   WindowConfig config_;
   std::vector<PointRef> points_;
@@ -114,6 +138,10 @@ class PhotometricProblem {
   std::vector<std::size_t> first_;  ///< First residual of each point, and one past the last.
   std::vector<Block> blocks_;
   std::vector<HostSums> sums_;  ///< Of each block.
+  std::vector<SampledResidual> sampled_;
+  std::vector<VecX> states_;  ///< Of the keyframes, at each linearization.
+  /// Relative displacement of each pair since each linearization.
+  std::vector<std::vector<std::array<float, 8>>> moved_;
   std::vector<Vec8> shifts_;  ///< From the frozen poses to the current ones, for `at_frozen_poses`.
 };
 

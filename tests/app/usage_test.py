@@ -53,7 +53,7 @@ class Configuration(CommandTest):
         dump = self.expect(sovo("--config", path, "--set", "seed=2", "config"), OK).stdout
         self.assertIn("seed: 2", dump)
         self.assertIn("active_points: 900", dump)
-        self.assertIn("immature_points: 600", dump)
+        self.assertIn("immature_points: 250", dump)
 
     def test_presets(self):
         default = self.expect(sovo("config"), OK).stdout.splitlines()
@@ -65,7 +65,7 @@ class Configuration(CommandTest):
                              for old, new in zip(default[1:], dump[1:]) if old != new]
         self.assertEqual(changed["default"], [])
         self.assertIn("active_points: 800", changed["embedded"])
-        self.assertEqual(changed["quality"], ["max_iterations: 10"])
+        self.assertEqual(changed["quality"], ["immature_points: 700", "max_iterations: 10"])
         for refused in (sovo("config", "--preset", "fast"),
                         sovo("config", "--config", self.file("preset: fast\n"))):
             self.expect(refused, USAGE)

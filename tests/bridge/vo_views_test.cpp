@@ -35,7 +35,7 @@ KeyframeOutput test_keyframe() {
 }
 
 /// A frame half a metre ahead of that keyframe.
-OdometryOutput test_output() {
+OdometryOutput output_with_views() {
   OdometryOutput output;
   output.stamp_ns = 8 * kSecond;
   output.state = OdometryState::kTracking;
@@ -47,7 +47,7 @@ OdometryOutput test_output() {
 
 TEST(PointsInView, AreWhereTheRawCameraSeesThemNow) {
   const CameraModel raw = test_cameras().rig.left;
-  const PointsInView points = points_in_view(test_output(), test_keyframe(), tracked_camera(), raw);
+  const PointsInView points = points_in_view(output_with_views(), test_keyframe(), tracked_camera(), raw);
   ASSERT_EQ(points.u.size(), 2U);
   const Vec2 expected = *raw.project(Vec3(0.5, 0.0, 1.5));
   EXPECT_NEAR(points.u[1], expected.x(), 1e-3);
@@ -56,7 +56,7 @@ TEST(PointsInView, AreWhereTheRawCameraSeesThemNow) {
 }
 
 TEST(PointsInView, GrowWithTheScaleCorrectionsSinceTheKeyframe) {
-  OdometryOutput output = test_output();
+  OdometryOutput output = output_with_views();
   output.T_odom_left = test_keyframe().T_odom_left;
   output.log_scale = std::log(2.0);
   const PointsInView points =
@@ -67,11 +67,11 @@ TEST(PointsInView, GrowWithTheScaleCorrectionsSinceTheKeyframe) {
 }
 
 TEST(PointsInView, OfAnotherSegmentOrWithoutAPoseAreNone) {
-  OdometryOutput output = test_output();
+  OdometryOutput output = output_with_views();
   output.segment = 4;
   EXPECT_TRUE(
       points_in_view(output, test_keyframe(), tracked_camera(), tracked_camera()).u.empty());
-  output = test_output();
+  output = output_with_views();
   output.pose_valid = false;
   EXPECT_TRUE(
       points_in_view(output, test_keyframe(), tracked_camera(), tracked_camera()).u.empty());
@@ -105,7 +105,7 @@ TEST(VoViews, PointsAreMadeOnlyForReaders) {
   publisher->set_cameras(tracked_camera(), test_cameras().rig.left);
   auto diagnostics = require(
       Reader<msg::DiagnosticArray>::open(other, topics::kDiagnostics, topics::kDiagnosticsQos));
-  OdometryOutput output = test_output();
+  OdometryOutput output = output_with_views();
   const auto feed = [&] {
     output.stamp_ns += kSecond / 10;
     publisher->on_keyframe(test_keyframe());

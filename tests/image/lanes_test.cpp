@@ -136,6 +136,10 @@ TEST(Lanes, EightGiveTheBitsOfFour) {
     run_wide<TryLanes>(image, x.data(), y.data(), eight.data());
     EXPECT_EQ(four, eight);
     EXPECT_EQ(four[71], 7.0F);
+    if (!has_avx512()) continue;
+    eight = {};
+    run_avx512<TryLanes>(image, x.data(), y.data(), eight.data());
+    EXPECT_EQ(four, eight);
   }
 }
 

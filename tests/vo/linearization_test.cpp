@@ -115,7 +115,7 @@ class WindowJacobian : public ::testing::Test {
     const double gradient = static_cast<double>(depth.gradient);
     HostSums sums;
     sums.clear(2);
-    const std::vector<TargetResidual> residuals = {{1, linearized_}};
+    const std::vector<TargetResidual> residuals = {{1, &linearized_}};
     sums.add(residuals, hessian, gradient);
     for (std::size_t i = 0; i < 8; ++i) {
       const auto row = static_cast<Eigen::Index>(i);

@@ -203,6 +203,60 @@ TEST(PhotometricProblem, StepsDepthsAsTheBackSubstitutionSays) {
   }
 }
 
+/// A linearization where each keyframe but the first has moved a little since the last one.
+WindowLinearization linearized_after_a_move(double resample_px, double size) {
+  Window window = scene_window(3, 12);
+  displace(1.0, 5, &window);
+  WorkerPool pool(1);
+  WindowConfig config;
+  config.resample_px = resample_px;
+  PhotometricProblem problem(config, collect_points(&window), &window, &pool);
+  const WindowLinearization stored = problem.stored();
+  WindowLinearization at;
+  problem.linearize(stored, {.system = false}, &at);
+  std::mt19937 random(7);
+  for (int i = 1; i < window.size(); ++i) {
+    Vec8 step;
+    for (double& value : step) value = size * uniform(random, -1.0, 1.0);
+    window[i].set_x(window[i].x + step);
+  }
+  for (const PointRef& ref : problem.points()) ref.point->rho *= 1.0 + size;
+  window.update_geometry();
+  problem.linearize(stored, {}, &at);
+  return at;
+}
+
+TEST(PhotometricProblem, TakesAPatternThatHardlyMovedAlongItsJacobian) {
+  const double size = 1e-5;
+  const WindowLinearization before = linearized_after_a_move(0.0, 0.0);
+  const WindowLinearization sampled = linearized_after_a_move(0.0, size);
+  const WindowLinearization moved = linearized_after_a_move(1.0, size);
+  double difference = 0.0;
+  double change = 0.0;
+  for (std::size_t k = 0; k < sampled.residuals.size(); ++k) {
+    const StoredResidual& a = sampled.residuals[k];
+    const StoredResidual& b = moved.residuals[k];
+    ASSERT_EQ(a.state, b.state);
+    EXPECT_NEAR(a.centre_u, b.centre_u, 1e-4);
+    EXPECT_NEAR(a.centre_v, b.centre_v, 1e-4);
+    difference += std::abs(static_cast<double>(a.raw_energy - b.raw_energy));
+    change += std::abs(static_cast<double>(a.raw_energy - before.residuals[k].raw_energy));
+  }
+  EXPECT_GT(change, 0.0);
+  EXPECT_LT(difference, 0.2 * change);
+  const VecX slope = sampled.system.b_top - before.system.b_top;
+  EXPECT_LT((moved.system.b_top - sampled.system.b_top).norm(), 0.2 * slope.norm());
+  EXPECT_GT((moved.system.b_top - sampled.system.b_top).norm(), 0.0);  // not sampled again
+}
+
+TEST(PhotometricProblem, SamplesAgainWhatMovedFarther) {
+  const WindowLinearization sampled = linearized_after_a_move(0.0, 1e-3);
+  const WindowLinearization moved = linearized_after_a_move(1e-4, 1e-3);
+  EXPECT_EQ(moved.system.b_top, sampled.system.b_top);
+  EXPECT_EQ(moved.system.schur, sampled.system.schur);
+  EXPECT_EQ(moved.energy, sampled.energy);
+}
+
 TEST(PhotometricProblem, ReclassifiesAsAFreshLinearizationWould) {
   Window window = scene_window(3, 12);
   displace(1.0, 5, &window);

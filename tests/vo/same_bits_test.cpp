@@ -55,10 +55,11 @@ TEST(SameBits, LinearizationAndItsSums) {
   HostSums sums;
   sums.clear(window.size());
   for (const Point& point : window[0].points) {
+    std::array<LinearizedResidual, kMaxSlots> linearized;
     std::vector<TargetResidual> residuals;
     DepthPart depth;
     for (int target = 1; target < window.size(); ++target) {
-      LinearizedResidual r;
+      LinearizedResidual& r = linearized[static_cast<std::size_t>(target)];
       residual_sum.add(linearize(window, {}, 0, target, point, {.state = ResidualState::kIn}, &r));
       if (r.state == ResidualState::kOutOfView) continue;
       residual_sum.add(std::span(r.gram));
@@ -68,7 +69,7 @@ TEST(SameBits, LinearizationAndItsSums) {
       residual_sum.add(std::span(r.cross));
       depth.hessian += depth_part(r).hessian;
       depth.gradient += depth_part(r).gradient;
-      residuals.push_back({target, r});
+      residuals.push_back({target, &r});
     }
     sums.add(residuals, static_cast<double>(depth.hessian), static_cast<double>(depth.gradient));
   }
@@ -137,7 +138,7 @@ Checksum tracked(const ImageF& image, const Residuals& residuals, const Gram& gr
   return sum;
 }
 
-TEST(SameBits, TrackerInFourAndInEightLanes) {
+TEST(SameBits, TrackerInEveryKindOfLanes) {
   if (!has_wide_lanes()) GTEST_SKIP() << "this processor has no registers of eight lanes";
   const ImageF image = noise_view(4);
   const auto four = tracked(
@@ -147,9 +148,14 @@ TEST(SameBits, TrackerInFourAndInEightLanes) {
       image, [](const auto&... args) { run_wide<ResidualPass>(args...); },
       [](const auto&... args) { run_wide<GramOfInliers>(args...); });
   EXPECT_EQ(four.value(), eight.value());
+  if (!has_avx512()) return;
+  const auto avx512 = tracked(
+      image, [](const auto&... args) { run_avx512<ResidualPass>(args...); },
+      [](const auto&... args) { run_avx512<GramOfInliers>(args...); });
+  EXPECT_EQ(four.value(), avx512.value());
 }
 
-TEST(SameBits, PatternsInFourAndInEightLanes) {
+TEST(SameBits, PatternsInEveryKindOfLanes) {
   if (!has_wide_lanes()) GTEST_SKIP() << "this processor has no registers of eight lanes";
   const ImageF image = noise_view(4);
   std::mt19937 random(9);
@@ -187,6 +193,13 @@ TEST(SameBits, PatternsInFourAndInEightLanes) {
     run_narrow<SumPattern>(in, four.data());
     run_wide<SumPattern>(in, eight.data());
     EXPECT_EQ(four, eight);
+    if (!has_avx512()) continue;
+    eight = {};
+    run_avx512<SumPattern>(in, eight.data());
+    EXPECT_EQ(four, eight);
+    EXPECT_TRUE(run_avx512<PlacePattern>(warp, &fx[8], &fy[8], &offset[8]));
+    EXPECT_TRUE(std::equal(&offset[0], &offset[8], &offset[8]));
+    EXPECT_TRUE(std::equal(&fx[0], &fx[8], &fx[8]) && std::equal(&fy[0], &fy[8], &fy[8]));
   }
   EXPECT_GT(in_view, 200);
 }

@@ -16,6 +16,7 @@ constexpr int kGaugeKeyframes = 5;
 WindowConfig without_priors() {
   WindowConfig config;
   config.prior_a = config.prior_b = config.depth_damping = 0.0;
+  config.resample_px = 0.0;  // the window is moved and scaled under the problem
   return config;
 }
 

@@ -36,7 +36,7 @@ TEST(TopicPolicy, NamesTopicsAsRosDoes) {
   EXPECT_EQ(ros_name_of("rq/sovo/service"), std::nullopt);
 }
 
-class Listener : public BusListener {
+class Gathering : public BusListener {
  public:
   void on_channel(const foxglove::Channel& channel) override {
     const std::lock_guard lock(mutex_);
@@ -77,7 +77,7 @@ class Bus : public testing::Test {
   ~Bus() override { bus_->stop(); }
 
   Participant vehicle_ = open_remote_participant();
-  Listener listener_;
+  Gathering listener_;
   std::unique_ptr<DdsBus> bus_;
 };
 

@@ -98,7 +98,7 @@ struct WindowConfig {
   double depth_damping = 100.0;            ///< Added to H_rho * mean_rho^2 of every point.
   double min_parallax = 2.0;               ///< Below it stereo depths stand against steps [px].
   double stop_threshold = 1.2;             ///< Times the step norms below which iteration stops.
-  double resample_px = 0.02;               ///< Motion of a pattern above which it is sampled anew.
+  double resample_px = 0.01;               ///< Motion of a pattern above which it is sampled anew.
   double prior_a = 1e4;                    ///< Weight of the prior on each frame's log-gain.
   double prior_b = 1.0;                    ///< The same for the bias.
   double min_relative_information = 50.0;  ///< H_rho * mean_rho^2 of a point to be marginalized.

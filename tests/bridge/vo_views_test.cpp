@@ -47,7 +47,8 @@ OdometryOutput output_with_views() {
 
 TEST(PointsInView, AreWhereTheRawCameraSeesThemNow) {
   const CameraModel raw = test_cameras().rig.left;
-  const PointsInView points = points_in_view(output_with_views(), test_keyframe(), tracked_camera(), raw);
+  const PointsInView points =
+      points_in_view(output_with_views(), test_keyframe(), tracked_camera(), raw);
   ASSERT_EQ(points.u.size(), 2U);
   const Vec2 expected = *raw.project(Vec3(0.5, 0.0, 1.5));
   EXPECT_NEAR(points.u[1], expected.x(), 1e-3);

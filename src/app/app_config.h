@@ -18,7 +18,7 @@ namespace sovo::app {
 enum class Preset {
   kEmbedded,  ///< Small computers: 800 points, 6 keyframes.
   kDefault,   ///< 2000 points, 7 keyframes.
-  kQuality,   ///< The same with more iterations of bundle adjustment.
+  kQuality,   ///< The same with more new points and iterations of bundle adjustment.
 };
 
 /// What the inner loops must compute. There is one answer: whatever registers they use, they give

@@ -29,7 +29,8 @@ struct GoldenFrame {
 
 /// A run to hold later ones against.
 struct Golden {
-  std::string kernels;
+  /// Whose bits the numbers have: those of scalar code, whatever registers computed them.
+  std::string kernels = "scalar";
   GoldenTolerances tolerances;
   std::vector<GoldenFrame> frames;
 };

@@ -4,13 +4,14 @@
 
 #include "sovo/app/profile_collector.h"
 #include "sovo/app/run_recorder.h"
+#include "sovo/image/lanes.h"
 
 namespace sovo::app {
 
 /// Circumstances of a run that belong beside its times.
 struct ProfileContext {
   int threads = 1;
-  std::string kernels = "scalar";
+  std::string kernels = lanes_name();  ///< Registers of the inner loops.
 };
 
 /// The times by stage as lines for the terminal.

@@ -68,6 +68,17 @@ inline bool has_avx512() {
 #endif
 }
 
+/// Which lanes `run_kernel` takes here.
+inline const char* lanes_name() {
+#if defined(__x86_64__)
+  return has_avx512() ? "avx512" : (has_wide_lanes() ? "avx2" : "sse");
+#elif defined(__aarch64__)
+  return "neon";
+#else
+  return "scalar";
+#endif
+}
+
 /// A kernel is a type with a lane function template `run`: this is `run` in four lanes.
 template <class Kernel, class... Args>
 auto run_narrow(const Args&... args) {

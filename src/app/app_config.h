@@ -16,7 +16,7 @@ namespace sovo::app {
 
 /// Sets of values for a purpose; what the user names still wins.
 enum class Preset {
-  kEmbedded,  ///< Small computers: 800 points, 6 keyframes.
+  kEmbedded,  ///< Small computers: 800 points, 5 keyframes.
   kDefault,   ///< 2000 points, 7 keyframes.
   kQuality,   ///< The same with more new points and iterations of bundle adjustment.
 };

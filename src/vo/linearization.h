@@ -75,7 +75,7 @@ struct DepthPart {
 DepthPart depth_part(const LinearizedResidual& residual);
 
 /// How a pattern has moved since it was sampled, to first order: its centre in the target image
-/// [px], and the brightness between its keyframes.
+/// [px], and the relative log-gain a and bias b [grey levels] of its keyframes.
 struct PatternShift {
   float u = 0.0F, v = 0.0F, a = 0.0F, b = 0.0F;
 };

@@ -110,18 +110,19 @@ class PhotometricProblem {
     int host = 0;
     std::size_t begin = 0, end = 0;  ///< Points.
   };
-  void add_damping(const PointRef& ref, double depth_damping);
   /// What is known of a residual before it is evaluated.
   struct Step {
-    bool settled = false;  ///< Not to be sampled.
-    PatternShift shift;    ///< Of a settled one.
-    PatternProjection projection;
+    bool settled = false;          ///< Not to be sampled.
+    PatternShift shift;            ///< Of a settled one.
+    PatternProjection projection;  ///< Of any other.
   };
+  void add_damping(const PointRef& ref, double depth_damping);
   void remember_poses();
   bool is_settled(const Block& block, std::size_t point, std::size_t residual, int target,
                   PatternShift* shift) const;
   void prepare(const Block& block, std::size_t point, std::size_t residual, int target,
                Step* step) const;
+  /// The residual as sampled now, which is kept, or in `moved` as it is by its Jacobian.
   const LinearizedResidual* evaluate(const Block& block, std::size_t point, std::size_t residual,
                                      const StoredResidual& known, const Step& step,
                                      LinearizedResidual* moved);
@@ -137,9 +138,9 @@ class PhotometricProblem {
   WorkerPool* pool_;
   std::vector<std::size_t> first_;  ///< First residual of each point, and one past the last.
   std::vector<Block> blocks_;
-  std::vector<HostSums> sums_;  ///< Of each block.
-  std::vector<SampledResidual> sampled_;
-  std::vector<VecX> states_;  ///< Of the keyframes, at each linearization.
+  std::vector<HostSums> sums_;            ///< Of each block.
+  std::vector<SampledResidual> sampled_;  ///< Every residual.
+  std::vector<VecX> states_;              ///< Of the keyframes, at each linearization.
   /// Relative displacement of each pair since each linearization.
   std::vector<std::vector<std::array<float, 8>>> moved_;
   std::vector<Vec8> shifts_;  ///< From the frozen poses to the current ones, for `at_frozen_poses`.

@@ -1,6 +1,6 @@
 # The core as an installed library: find_package(sovo) gives sovo::sovo, which links every core
-# room, and each room by its own name (sovo::geometry, ...). Where the command is built, which src/app
-# installs, its configuration goes along.
+# room, and each room by its own name (sovo::geometry, ...). Where the command is built, its
+# configuration goes along.
 include(GNUInstallDirs)
 include(CMakePackageConfigHelpers)
 

@@ -1,4 +1,5 @@
 #include <png.h>
+#include <zlib.h>
 
 #include <csetjmp>
 #include <cstring>
@@ -77,7 +78,10 @@ bool write_all(png_structp png, png_infop info, const GreyImage* image, png_byte
                PngJob* job) {
   if (setjmp(png_jmpbuf(png)) != 0) return false;
   png_set_write_fn(png, job, write_bytes, flush_nothing);
+  // Camera noise leaves little else to find: three times as fast as looking for repetitions.
+  png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
   png_set_compression_level(png, 1);
+  png_set_compression_strategy(png, Z_RLE);
   png_set_IHDR(png, info, static_cast<png_uint_32>(image->width),
                static_cast<png_uint_32>(image->height), 8 * image->bytes_per_pixel(),
                PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,

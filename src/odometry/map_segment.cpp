@@ -11,7 +11,6 @@ namespace sovo {
 namespace {
 
 constexpr std::size_t kMatchBlock = 64;
-constexpr std::size_t kScoutStride = 8;
 /// So many keyframes wait for a scale, the newest ones: a map may go without one for days.
 constexpr std::size_t kMostWaiting = 200;
 
@@ -55,6 +54,12 @@ DepthProposal proposal_of(const StaticMatch& match) {
   return {match.inverse_depth, match.sigma};
 }
 
+/// Every how many pixels one is a scout: one in eight, and more where pixels are few.
+std::size_t scout_stride(std::size_t num_pixels) {
+  constexpr std::size_t kEnough = 60;
+  return std::clamp<std::size_t>(num_pixels / kEnough, 1, 8);
+}
+
 /// The scouts are matched over the whole range; the others then no nearer than half as far as the
 /// nearest of those: a long search costs most of the time, and may go astray.
 std::pair<float, float> range_of_scouts(const std::vector<StaticMatch>& matches,
@@ -63,7 +68,7 @@ std::pair<float, float> range_of_scouts(const std::vector<StaticMatch>& matches,
   constexpr float kNearer = 2.0F;
   float nearest = 0.0F;
   int matched = 0;
-  for (std::size_t i = 0; i < matches.size(); i += kScoutStride) {
+  for (std::size_t i = 0; i < matches.size(); i += scout_stride(matches.size())) {
     if (matches[i].state != MatchState::kMatched) continue;
     nearest = std::max(nearest, matches[i].inverse_depth);
     ++matched;
@@ -217,8 +222,9 @@ std::vector<StaticMatch> MapSegment::match_all(const ImagePyramid& left, const I
   };
   std::vector<std::size_t> scouts;
   std::vector<std::size_t> others;
+  const std::size_t stride = scout_stride(pixels.size());
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    (i % kScoutStride == 0 ? scouts : others).push_back(i);
+    (i % stride == 0 ? scouts : others).push_back(i);
   }
   match_some(scouts, {});
   match_some(others, {.inverse_depth_range = range_of_scouts(matches, matcher_.whole_range())});

@@ -75,14 +75,17 @@ Mat2f axes_of(const Vec2& direction) {
   return axes;
 }
 
-/// Columns that are read with the last ones, but are none.
+/// Columns that are read with the last ones, but are none. In lanes: so few floats are filled
+/// slowly otherwise.
 void pad(Strip* strip) {
   const auto k = static_cast<std::size_t>(strip->size);
-  constexpr std::size_t kPadding = 2 * kWideLanes + kPatchAlong;
-  for (auto& row : strip->rows) std::fill_n(&row[k], kPadding, 0.0F);
-  std::fill_n(&strip->sum[k], kPadding, 0.0F);
-  std::fill_n(&strip->energy[k], kPadding, 0.0F);
-  std::fill_n(&strip->seen[k], kPadding, 0);
+  static_assert(kPatchAlong <= kWideLanes);
+  for (std::size_t i = 0; i < 3 * kWideLanes; i += kWideLanes) {
+    for (auto& row : strip->rows) store_lane(WideLane{}, &row[k + i]);
+    store_lane(WideLane{}, &strip->sum[k + i]);
+    store_lane(WideLane{}, &strip->energy[k + i]);
+    store_mask(WideLaneMask{}, &strip->seen[k + i]);
+  }
 }
 
 /// Samples the target from half a patch before rho_min to half a patch after rho_max; ends early
@@ -170,11 +173,13 @@ int CorrelationProfile::best() const {
 
 int CorrelationProfile::best_other_mode(int from, int distance) const {
   int best = -1;
+  float highest = kUnseen;
   for (int i = 0; i < size; ++i) {
-    if (std::abs(i - from) <= distance || score[i] <= kUnseen) continue;
+    if (score[i] <= highest || std::abs(i - from) <= distance) continue;
     if (i > 0 && score[i - 1] > score[i]) continue;
     if (i + 1 < size && score[i + 1] > score[i]) continue;
-    if (best < 0 || score[i] > score[best]) best = i;
+    best = i;
+    highest = score[i];
   }
   return best;
 }
@@ -221,24 +226,35 @@ struct Template {
   Mat2f axes;  ///< Along and across in the target image.
 };
 
-bool make_template(const PatchSearch& search, const CurvePoint& point, Template* out) {
-  constexpr int kColumn = kPatchAcross + 2;
-  alignas(32) std::array<float, Grid<kHalfAlong + 1, kHalfAcross + 1>::kPadded> grid;
-  out->axes = axes_of(point.derivative);
+/// The base patch at level 0, as the target sees it, with a pixel more on each side.
+struct TemplateGrid {
+  static constexpr int kColumn = kPatchAcross + 2;
+  alignas(32) std::array<float, Grid<kHalfAlong + 1, kHalfAcross + 1>::kPadded> values;
+
+  const float* at(int i, int j) const { return values.data() + (i + 1) * kColumn + j + 1; }
+  float along(int i, int j) const { return 0.5F * (at(i, j)[kColumn] - at(i, j)[-kColumn]); }
+  float across(int i, int j) const { return 0.5F * (at(i, j)[1] - at(i, j)[-1]); }
+};
+
+bool sample_template(const PatchSearch& search, const CurvePoint& point, const Mat2f& axes,
+                     TemplateGrid* grid) {
   const Mat2f base_from_target = point.target_from_base.inverse().cast<float>();
-  if (!base_from_target.allFinite()) return false;
-  if (!sample_grid<kHalfAlong + 1, kHalfAcross + 1>(
-          search.base->level(0), search.pixel.cast<float>(), base_from_target * out->axes, &grid)) {
-    return false;
-  }
+  return base_from_target.allFinite() && sample_grid<kHalfAlong + 1, kHalfAcross + 1>(
+                                             search.base->level(0), search.pixel.cast<float>(),
+                                             base_from_target * axes, &grid->values);
+}
+
+bool make_template(const PatchSearch& search, const CurvePoint& point, Template* out) {
+  TemplateGrid grid;
+  out->axes = axes_of(point.derivative);
+  if (!sample_template(search, point, out->axes, &grid)) return false;
   for (int i = 0; i < kPatchAlong; ++i) {
     for (int j = 0; j < kPatchAcross; ++j) {
-      const float* g = grid.data() + (i + 1) * kColumn + j + 1;
       const auto k = static_cast<std::size_t>(i * kPatchAcross + j);
-      out->value[k] = g[0];
-      out->along[k] = 0.5F * (g[kColumn] - g[-kColumn]);
+      out->value[k] = grid.at(i, j)[0];
+      out->along[k] = grid.along(i, j);
       out->shear[k] = static_cast<float>(j - kHalfAcross) * out->along[k];
-      out->across[k] = 0.5F * (g[1] - g[-1]);
+      out->across[k] = grid.across(i, j);
     }
   }
   remove_mean(&out->value);
@@ -350,9 +366,18 @@ void measure_displacement_across(const PatchSearch& search, const Template& base
 
 std::optional<double> gradient_along(const PatchSearch& search, double rho) {
   const auto point = search.curve.at(rho);
-  Template base;
-  if (!point || !make_template(search, *point, &base)) return std::nullopt;
-  return std::sqrt(base.normal(1, 1) / kPatchSize);
+  TemplateGrid grid;
+  if (!point || !sample_template(search, *point, axes_of(point->derivative), &grid)) {
+    return std::nullopt;
+  }
+  alignas(32) Patch along;
+  for (int i = 0; i < kPatchAlong; ++i) {
+    for (int j = 0; j < kPatchAcross; ++j) {
+      along[static_cast<std::size_t>(i * kPatchAcross + j)] = grid.along(i, j);
+    }
+  }
+  remove_mean(&along);
+  return std::sqrt(static_cast<double>(dot(along, along)) / kPatchSize);
 }
 
 std::optional<Alignment> align(const PatchSearch& search, double rho, bool measure_across) {

@@ -32,8 +32,9 @@ if(SOVO_SANITIZE)
 endif()
 
 # sovo_room(NAME [CORE] [LIGHT] [LOOPS globs...] [ROOMS below...] [LINK libraries...]): the static
-# library sovo_NAME from every source below src/NAME but main.cpp. CORE rooms are installed as libsovo. A LIGHT
-# room is optimized lightly, but for the sources that LOOPS names, which loop over pixels.
+# library sovo_NAME from every source below src/NAME but main.cpp. CORE rooms are installed as
+# libsovo. A LIGHT room is optimized lightly, but for the sources that LOOPS names, which loop over
+# pixels.
 function(sovo_room name)
   cmake_parse_arguments(ROOM "CORE;LIGHT" "" "LOOPS;ROOMS;LINK" ${ARGN})
   set(room ${PROJECT_SOURCE_DIR}/src/${name})

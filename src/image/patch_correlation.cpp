@@ -79,8 +79,11 @@ Mat2f axes_of(const Vec2& direction) {
 /// slowly otherwise.
 void pad(Strip* strip) {
   const auto k = static_cast<std::size_t>(strip->size);
-  static_assert(kPatchAlong <= kWideLanes);
-  for (std::size_t i = 0; i < 3 * kWideLanes; i += kWideLanes) {
+  // A window's columns beyond two registers' worth of windows.
+  constexpr std::size_t kPadding = 3 * kWideLanes;
+  static_assert(kPadding >= 2 * kWideLanes + kPatchAlong &&
+                Strip::kStride >= Strip::kColumns + kPadding);
+  for (std::size_t i = 0; i < kPadding; i += kWideLanes) {
     for (auto& row : strip->rows) store_lane(WideLane{}, &row[k + i]);
     store_lane(WideLane{}, &strip->sum[k + i]);
     store_lane(WideLane{}, &strip->energy[k + i]);

@@ -54,7 +54,8 @@ DepthProposal proposal_of(const StaticMatch& match) {
   return {match.inverse_depth, match.sigma};
 }
 
-/// Every how many pixels one is a scout: one in eight, and more where pixels are few.
+/// Every how many pixels one is a scout: one in eight, or more where that would make fewer than
+/// sixty, of whom too few would be matched to tell the range.
 std::size_t scout_stride(std::size_t num_pixels) {
   constexpr std::size_t kEnough = 60;
   return std::clamp<std::size_t>(num_pixels / kEnough, 1, 8);
@@ -63,12 +64,13 @@ std::size_t scout_stride(std::size_t num_pixels) {
 /// The scouts are matched over the whole range; the others then no nearer than half as far as the
 /// nearest of those: a long search costs most of the time, and may go astray.
 std::pair<float, float> range_of_scouts(const std::vector<StaticMatch>& matches,
+                                        const std::vector<std::size_t>& scouts,
                                         std::pair<float, float> whole) {
   constexpr int kFewest = 30;
   constexpr float kNearer = 2.0F;
   float nearest = 0.0F;
   int matched = 0;
-  for (std::size_t i = 0; i < matches.size(); i += scout_stride(matches.size())) {
+  for (const std::size_t i : scouts) {
     if (matches[i].state != MatchState::kMatched) continue;
     nearest = std::max(nearest, matches[i].inverse_depth);
     ++matched;
@@ -227,7 +229,8 @@ std::vector<StaticMatch> MapSegment::match_all(const ImagePyramid& left, const I
     (i % stride == 0 ? scouts : others).push_back(i);
   }
   match_some(scouts, {});
-  match_some(others, {.inverse_depth_range = range_of_scouts(matches, matcher_.whole_range())});
+  match_some(others,
+             {.inverse_depth_range = range_of_scouts(matches, scouts, matcher_.whole_range())});
   return matches;
 }
 

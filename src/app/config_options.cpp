@@ -14,8 +14,7 @@ std::vector<std::string> preset_assignments(Preset preset) {
     return {"vo.points.immature_points=700", "vo.window.max_iterations=10"};
   }
   return {"vo.points.active_points=800", "vo.points.immature_points=250",
-          "vo.keyframe.max_keyframes=5", "vo.keyframe.min_keyframes=4",
-          "vo.window.max_iterations=4"};
+          "vo.keyframe.max_keyframes=5", "vo.keyframe.min_keyframes=4"};
 }
 
 Result<void> apply_all(const std::vector<std::string>& assignments, AppConfig* config) {

@@ -29,7 +29,22 @@ struct Ranked {
   SE3 T;
 };
 constexpr double kExplainsNothing = 1e9;
-constexpr std::size_t kFavourites = 4;  ///< Motions looked at again for each that is kept.
+constexpr std::size_t kFavourites = 4;    ///< Motions looked at again for each that is kept.
+constexpr std::size_t kRankPoints = 500;  ///< Of a level: enough to compare motions, of thousands.
+
+/// Every n-th point, so that few more than `most` are left.
+ReferenceLevel thinned(const ReferenceLevel& all, std::size_t most) {
+  const std::size_t stride = std::max<std::size_t>(1, all.size() / most);
+  ReferenceLevel out;
+  out.camera = all.camera;
+  for (std::size_t i = 0; i < all.size(); i += stride) {
+    out.u.push_back(all.u[i]);
+    out.v.push_back(all.v[i]);
+    out.rho.push_back(all.rho[i]);
+    out.colour.push_back(all.colour[i]);
+  }
+  return out;
+}
 
 /// Prior on a frame's brightness: that of the reference.
 struct BrightnessPrior {
@@ -288,12 +303,14 @@ std::vector<SE3> CoarseTracker::rank(const TrackingReference& reference,
       std::min(static_cast<int>(reference.levels.size()), pyramid.num_levels()) - 1;
   std::vector<Ranked> ranked;
   for (const SE3& start : hypotheses) ranked.push_back({0.0, start});
+  TrackingReference few = reference;
   for (int l = coarsest; l >= std::max(0, coarsest - 1); --l) {
-    const ReferenceLevel& level = reference.levels[static_cast<std::size_t>(l)];
+    ReferenceLevel& level = few.levels[static_cast<std::size_t>(l)];
+    level = thinned(level, kRankPoints);
     for (Ranked& r : ranked) {
       double cutoff = config_.cutoff;
       Affine affine = affine_guess;
-      const LevelOutcome o = align_level(reference, l, pyramid.level(l), exposure_s, &cutoff, &r.T,
+      const LevelOutcome o = align_level(few, l, pyramid.level(l), exposure_s, &cutoff, &r.T,
                                          &affine, kRankIterations);
       const double inliers =
           static_cast<double>(o.last.inliers) / static_cast<double>(level.size());

@@ -34,9 +34,9 @@ struct TrackerConfig {
 /// 1120 / (width + height)) and the brightness change exceeds 1, or a smaller sum and a residual
 /// twice the first one's.
 struct KeyframeConfig {
-  double flow_translation = 0.02;
-  double flow_total = 0.02;
-  double approach = 9.0;
+  double flow_translation = 0.012;
+  double flow_total = 0.012;
+  double approach = 3.6;
   double brightness = 2.0;
   double rmse_factor = 2.0;
   double rmse_min_score = 0.13;
@@ -88,7 +88,7 @@ struct PointConfig {
 
 /// Sliding-window photometric bundle adjustment.
 struct WindowConfig {
-  int max_iterations = 6;
+  int max_iterations = 4;
   int min_iterations = 2;
   double huber = 9.0;
   double outlier_threshold = 144.0;  ///< A pixel: start value of the adaptive outlier threshold.

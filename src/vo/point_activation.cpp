@@ -130,9 +130,8 @@ std::vector<PointActivator::Candidate> PointActivator::choose(Window* window) co
   return chosen;
 }
 
-void PointActivator::evaluate(const Window& window, const Candidate& candidate, const Point& point,
-                              double slack, DepthEvaluation* out) const {
-  const float threshold = window[candidate.host].immature[candidate.index].energy_threshold;
+void PointActivator::linearize(const Window& window, const Candidate& candidate, const Point& point,
+                               DepthEvaluation* out) const {
   const Residual fresh{.state = ResidualState::kIn};
   std::array<PatternProjection, kMaxSlots> projections;
   for (int t = 0; t < window.size(); ++t) {
@@ -141,24 +140,32 @@ void PointActivator::evaluate(const Window& window, const Candidate& candidate, 
     project_pattern(window, candidate.host, t, point, &projection);
     prefetch_pattern(window, t, projection);
   }
-  out->energy = out->hessian = out->gradient = 0.0;
   for (int t = 0; t < window.size(); ++t) {
     if (t == candidate.host) continue;
     const auto k = static_cast<std::size_t>(t);
-    LinearizedResidual& r = out->residuals[k];
     linearize_projected(window, window_config_, candidate.host, t, point, fresh, projections[k],
-                        &r);
+                        &out->residuals[k]);
+  }
+}
+
+void PointActivator::judge(const Window& window, const Candidate& candidate, double slack,
+                           DepthEvaluation* at) {
+  const float threshold = window[candidate.host].immature[candidate.index].energy_threshold;
+  at->energy = at->hessian = at->gradient = 0.0;
+  for (int t = 0; t < window.size(); ++t) {
+    if (t == candidate.host) continue;
+    LinearizedResidual& r = at->residuals[static_cast<std::size_t>(t)];
     if (r.state == ResidualState::kOutOfView) {
-      out->energy += threshold;
+      at->energy += threshold;
       continue;
     }
     const bool inlier = r.raw_energy < threshold * slack && is_textured(r);
     r.state = inlier ? ResidualState::kIn : ResidualState::kOutlier;
-    out->energy += inlier ? r.raw_energy : threshold * slack;
+    at->energy += inlier ? r.raw_energy : threshold * slack;
     if (inlier) {
       const DepthPart part = depth_part(r);
-      out->hessian += static_cast<double>(part.hessian);
-      out->gradient += static_cast<double>(part.gradient);
+      at->hessian += static_cast<double>(part.hessian);
+      at->gradient += static_cast<double>(part.gradient);
     }
   }
 }
@@ -176,19 +183,21 @@ void PointActivator::optimize(const Window& window, double mean_rho, Candidate* 
   p.static_information = immature.static_information;
 
   DepthEvaluation now;
-  evaluate(window, *candidate, p, 1e3, &now);
+  linearize(window, *candidate, p, &now);
+  judge(window, *candidate, 1e3, &now);
   const double unit = mean_rho * mean_rho;
   double lambda = kDepthStartLambda;
   // A camera that turns on the spot shows no parallax, and yet needs points: those of stereo.
   const bool known = p.static_information * p.rho * p.rho >= kMinStaticInformation;
   if (now.hessian * unit < kMinRelativeInformation && !known) return;  // stays immature
   double best_rho = p.rho;
-  evaluate(window, *candidate, p, 1.0, &now);
+  judge(window, *candidate, 1.0, &now);
   DepthEvaluation next;
   for (int it = 0; it < kIterations && now.hessian * unit >= kMinRelativeInformation; ++it) {
     const double step = now.gradient / (now.hessian * (1.0 + lambda));
     p.rho = best_rho - step;
-    evaluate(window, *candidate, p, 1.0, &next);
+    linearize(window, *candidate, p, &next);
+    judge(window, *candidate, 1.0, &next);
     if (next.energy < now.energy) {
       best_rho = p.rho;
       std::swap(now, next);

@@ -63,8 +63,12 @@ class PointActivator {
   void adapt_spacing(int active);
   std::vector<Candidate> choose(Window* window) const;
   void optimize(const Window& window, double mean_rho, Candidate* candidate) const;
-  void evaluate(const Window& window, const Candidate& candidate, const Point& point, double slack,
-                DepthEvaluation* out) const;
+  /// All residuals of a candidate at its present depth.
+  void linearize(const Window& window, const Candidate& candidate, const Point& point,
+                 DepthEvaluation* out) const;
+  /// Adds those up that are inliers with the threshold times `slack`.
+  static void judge(const Window& window, const Candidate& candidate, double slack,
+                    DepthEvaluation* at);
 
   PointConfig config_;
   WindowConfig window_config_;

@@ -4,40 +4,18 @@ import math
 import os
 
 import harness
+from flights import nothing_but_turning, rest_motion_rest, restless, turn_on_the_spot
+from flights import write_trajectory
 from harness import FAILED, OK, largest_error, read_tum, sovo
 from sim_test import SimTest
 
 LONG = bool(os.environ.get("SOVO_TEST_LONG"))
 
 
-def eased(t, begin, end):
-    """From 0 to 1, with velocity and acceleration 0 at both ends."""
-    u = min(1.0, max(0.0, (t - begin) / (end - begin)))
-    return u * u * u * (u * (6 * u - 15) + 10)
-
-
-def turned(yaw, pitch=0.0):
-    """Quaternion x y z w of a vehicle (x forward, y left, z up) [rad]."""
-    cy, sy, cp, sp = (f(0.5 * a) for a in (yaw, pitch) for f in (math.cos, math.sin))
-    return [-sy * sp, cy * sp, sy * cp, cy * cp]
-
-
-def restless(t, halt):
-    """Loops with turns of up to 110 deg/s and 2.5 m/s, which end in a halt within 0.6 s."""
-    braked = min(1.0, max(0.0, (t - halt) / 0.6))
-    a = 2 * math.pi / 2.6 * (min(t, halt) + 0.3 * (1 - (1 - braked) ** 2))
-    return ([0.9 * math.sin(2 * a), 1.2 * math.sin(a), 0.3 * math.sin(2 * a)],
-            turned(math.radians(45) * math.sin(a), math.radians(15) * math.sin(1.7 * a)))
-
-
 class Robustness(SimTest):
     def trajectory(self, pose, seconds):
         path = self.folder / "trajectory.txt"
-        with path.open("w") as file:
-            for i in range(round(50 * seconds) + 1):
-                position, rotation = pose(0.02 * i)
-                numbers = " ".join(f"{v:.9f}" for v in [*position, *rotation])
-                file.write(f"{1.6e9 + 0.02 * i:.2f} {numbers}\n")
+        write_trajectory(path, pose, seconds)
         return ("--trajectory", path, "--set", "sim.trajectory_body=base")
 
     def fly(self, world, *options, code=OK, **sensor):
@@ -92,20 +70,16 @@ class Robustness(SimTest):
         self.assertLess(largest_error(still, truth, still[0][0]), 0.005)
 
     def test_turning_on_the_spot(self):
-        flight = self.trajectory(
-            lambda t: ([eased(t, 0, 2) + eased(t, 6, 8), 0, 0],
-                       turned(math.radians(80) * (eased(t, 2, 4) - eased(t, 4, 6)))), 8.0)
+        flight = self.trajectory(turn_on_the_spot, 8.0)
         self.expect_whole(*self.fly("hall", *flight), 0.03)
 
     def test_nothing_but_turning(self):
-        flight = self.trajectory(
-            lambda t: ([0, 0, 0], turned(math.radians(40) * math.sin(math.pi * t / 3))), 4.0)
+        flight = self.trajectory(nothing_but_turning, 4.0)
         self.expect_whole(*self.fly("hall", *flight), 0.02)
 
     def test_rest_then_motion_then_rest(self):
         seconds = 63.0 if LONG else 8.0
-        flight = self.trajectory(
-            lambda t: ([1.5 * eased(t, 0.5, 3), 0.8 * eased(t, 0.5, 3), 0], turned(0)), seconds)
+        flight = self.trajectory(rest_motion_rest, seconds)
         truth, live = self.fly("hall", *flight)
         self.expect_whole(truth, live, 0.01)
         still = [p for p in live if float(p[0]) > 1.6e9 + 3.5]

@@ -78,7 +78,7 @@ class Outputs(CommandTest):
         names = {"--out": "out.txt", "--out-live": "live.txt", "--keyframes": "kf.csv",
                  "--profile": "profile.json"}
         files = [str(x) for option, name in names.items() for x in (option, self.folder / name)]
-        several_keyframes = ["--set", "vo.keyframe.flow_translation=0.04"]
+        several_keyframes = ["--set", "vo.keyframe.flow_translation=0.08"]
         result = self.expect(sovo("run", "--dataset", DATASET, "--rate", "max", "--frames", 20,
                                   "--start", 5, *several_keyframes, *files), OK)
         for word in ("frames fed       20", "frames tracked   20 (100.0 %)", "scale verdicts",

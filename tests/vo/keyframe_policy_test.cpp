@@ -28,16 +28,16 @@ class KeyframeDecision : public ::testing::Test {
 };
 
 TEST_F(KeyframeDecision, FlowOrBrightnessAloneSuffices) {
-  EXPECT_FALSE(wanted(24.0, 1.0));
-  EXPECT_TRUE(wanted(26.0, 1.0));
+  EXPECT_FALSE(wanted(40.0, 1.0));
+  EXPECT_TRUE(wanted(43.0, 1.0));
   EXPECT_FALSE(wanted(0.0, 1.0, 0.49));
   EXPECT_TRUE(wanted(0.0, 1.0, 0.51));
   EXPECT_TRUE(wanted(0.0, 1.0, -0.51));
 }
 
 TEST_F(KeyframeDecision, MotionAlongTheViewSufficesWhereItMakesLittleFlow) {
-  EXPECT_FALSE(wanted(5.0, 1.0, 0.0, 0.08));
-  EXPECT_TRUE(wanted(5.0, 1.0, 0.0, 0.1));
+  EXPECT_FALSE(wanted(5.0, 1.0, 0.0, 0.23));
+  EXPECT_TRUE(wanted(5.0, 1.0, 0.0, 0.26));
 }
 
 TEST_F(KeyframeDecision, ABadFitMakesOneWhereThereIsParallax) {

@@ -12,6 +12,7 @@
 #include "sovo/driver/sim/world.h"
 #include "sovo/eval/evaluation.h"
 #include "sovo/eval/nees.h"
+#include "sovo/eval/relative_nees.h"
 
 namespace sovo::app {
 namespace {
@@ -22,6 +23,10 @@ class Recording : public OutputSink {
   void on_frame(const OdometryOutput& output) override {
     ++frames_;
     tracked_ += output.pose_valid ? 1 : 0;
+    if (output.pose_valid && output.scale_valid) {
+      poses_.push_back({output.stamp_ns, output.segment, output.T_odom_left, output.pose_covariance,
+                        output.frame_covariance});
+    }
     if (!output.is_keyframe) return;
     ++keyframes_;
     if (output.scale_valid) sigmas_[output.stamp_ns] = output.log_scale_sigma;
@@ -37,11 +42,13 @@ class Recording : public OutputSink {
   const std::vector<KeyframeRecord>& scales() const { return scales_; }
   /// Posterior sigma of the log scale at the keyframes, by stamp.
   const std::map<std::int64_t, double>& sigmas() const { return sigmas_; }
+  const std::vector<UncertainPose>& poses() const { return poses_; }
 
  private:
   std::size_t frames_ = 0, tracked_ = 0, keyframes_ = 0;
   std::vector<KeyframeRecord> scales_;
   std::map<std::int64_t, double> sigmas_;
+  std::vector<UncertainPose> poses_;
 };
 
 AppConfig configured(const AppConfig& config, const SyntheticCase& which, std::uint64_t seed) {
@@ -100,6 +107,8 @@ Result<SyntheticResult> measure(const Recording& recording, const Trajectory& tr
   result.scale_median = report->scale.median_abs;
   result.scale_p95 = report->scale.p95_abs;
   result.scale_nees = scale_nees(*report, truth, recording.sigmas());
+  result.pose_nees_1s = relative_nees(recording.poses(), truth, {.seconds = 1.0});
+  result.pose_nees_10m = relative_nees(recording.poses(), truth, {.metres = 10.0});
   result.frame_ms = frame_ms;
   result.keyframes_per_frame = static_cast<double>(recording.keyframes()) / frames;
   return result;

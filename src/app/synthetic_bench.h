@@ -36,6 +36,10 @@ struct SyntheticResult {
   double scale_p95 = 0.0;
   /// Mean of (ln s / sigma)^2 with the scale's posterior sigma at the keyframe: 1 when honest.
   double scale_nees = 0.0;
+  /// The same per degree of freedom of the published poses, one as seen from another 1 s or 10 m
+  /// before it.
+  double pose_nees_1s = 0.0;
+  double pose_nees_10m = 0.0;
   double frame_ms = 0.0;             ///< Mean, everything but rendering, one frame after the other.
   double keyframes_per_frame = 0.0;  ///< [1]
 };

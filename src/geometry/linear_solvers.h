@@ -19,6 +19,9 @@ SmallVector solve_small(const SmallMatrix& A, const SmallVector& b);
 /// The same of any size.
 VecX solve_symmetric(const MatX& A, const VecX& b);
 
+/// The same for every column of B.
+MatX solve_symmetric_columns(const MatX& A, const MatX& B);
+
 /// Eigenvalues, ascending, and orthonormal eigenvectors in columns.
 struct SymmetricEigen {
   VecX values;

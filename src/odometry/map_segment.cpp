@@ -93,7 +93,8 @@ MapSegment::MapSegment(const StereoOdometryConfig& config, const FramePreparatio
       vo_(config.vo, preparation.rig().left, preparation.left_mask(), config.seed, pool),
       matcher_(config.matcher, preparation.rig()),
       optimizer_(config.scale, preparation.rig()),
-      filter_(config.filter) {}
+      filter_(config.filter),
+      scale_path_until_(T_odom_left_start.translation()) {}
 
 bool MapSegment::initialize(const MonoFrame& frame, const SideImage* right) {
   // Two views take their time; meanwhile a camera may be uncovered, or come to another texture.
@@ -323,8 +324,19 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
     record.correction = vo_.apply(correction);
     if (correction.first_lock) refined_until_ = 0;  // it rescales what was built before
   }
+  extend_scale_path(position, filter_.locked() && !was_locked);
   publish_scale(&record, update.apply);
   return record;
+}
+
+/// The filter's `path_sigma` is made for steps that are summed as if their errors were independent.
+void MapSegment::extend_scale_path(const Vec3& position, bool first_lock) {
+  const Vec3 step = position - scale_path_until_;
+  const double sigma = filter_.path_sigma();
+  scale_path_until_ = position;
+  // Before the lock there were no metres.
+  if (first_lock) scale_path_covariance_.setZero();
+  if (filter_.locked()) scale_path_covariance_ += sigma * sigma * step * step.transpose();
 }
 
 void MapSegment::publish_scale(const ScaleRecord* record, bool accepted) {
@@ -332,6 +344,8 @@ void MapSegment::publish_scale(const ScaleRecord* record, bool accepted) {
   status_.locked = filter_.locked() && config_.mode == OdometryMode::kScale;
   status_.log_scale = vo_.log_scale();
   status_.sigma = filter_.sigma();
+  status_.path_covariance = scale_path_covariance_;
+  status_.path_until = scale_path_until_;
   if (record != nullptr) {
     status_.last_correction = record->correction;
     status_.residual = record->residual;

@@ -22,6 +22,10 @@ struct ScaleStatus {
   double residual = 0.0;
   std::int64_t accepted_stamp_ns = 0;
   ScaleVerdict verdict = ScaleVerdict::kTooFewPoints;
+  /// What errors of scale add to the covariance of a position since the segment began [m^2], up to
+  /// the place of the newest keyframe whose scale was sought.
+  Mat3 path_covariance = Mat3::Zero();
+  Vec3 path_until = Vec3::Zero();
 };
 
 /// A keyframe's snapshot with the right image that was taken with it.
@@ -93,6 +97,7 @@ class MapSegment {
   void revise(const SE3& T_odom_left, KeyframeOutput* keyframe) const;
   void revise_left(const std::vector<KeyframeState>& left, std::vector<KeyframeOutput>* out);
   void publish_scale(const ScaleRecord* record, bool accepted);
+  void extend_scale_path(const Vec3& position, bool first_lock);
 
   const StereoOdometryConfig& config_;
   const FramePreparation& preparation_;
@@ -120,6 +125,8 @@ class MapSegment {
   std::size_t refined_until_ = 0;        ///< Those before this one do not change any more.
 
   std::optional<Vec3> last_keyframe_position_;
+  Mat3 scale_path_covariance_ = Mat3::Zero();
+  Vec3 scale_path_until_ = Vec3::Zero();
   mutable std::mutex status_mutex_;
   ScaleStatus status_;
 };

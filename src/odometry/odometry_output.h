@@ -51,7 +51,11 @@ struct OdometryOutput {
 
   bool pose_valid = false;  ///< False: T_odom_left and what follows from it mean nothing.
   SE3 T_odom_left;          ///< Left optical camera into the odometry's world; first pose identity.
-  Mat6 pose_covariance = Mat6::Zero();  ///< Of (translation, rotation) in odom axes [m, rad].
+  /// Of (translation, rotation about fixed axes) in odom axes [m, rad], since the segment began: it
+  /// grows with the way, by what keyframes, scale and this frame's alignment leave open.
+  Mat6 pose_covariance = Mat6::Zero();
+  /// The part of it that is this frame's alone, which no later frame inherits.
+  Mat6 frame_covariance = Mat6::Zero();
   Vec6 velocity =
       Vec6::Zero();  ///< Of the left camera in its own axes (linear, angular) [m/s, rad/s].
   Mat6 velocity_covariance = Mat6::Zero();

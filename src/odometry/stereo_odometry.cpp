@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "sovo/geometry/pose_covariance.h"
 #include "sovo/odometry/live_threads.h"
 #include "sovo/odometry/map_segment.h"
 #include "sovo/odometry/trajectory_recorder.h"
@@ -125,7 +126,7 @@ class StereoOdometry::Impl {
     recorder_.add(first);
     out->is_keyframe = true;
     out->keyframe_id = reference->keyframe_id;
-    set_pose(first.T_world_camera, Mat6::Zero(), out);
+    set_pose(first.T_world_camera, Mat6::Zero(), Mat6::Zero(), out);
     out->state = state_of(*out, TrackingResult(), "");
   }
 
@@ -147,7 +148,10 @@ class StereoOdometry::Impl {
     out->keyframe_id = tracked.reference->keyframe_id;
     out->inliers = static_cast<std::uint32_t>(t.inliers);
     out->residual = t.rmse;
-    set_pose(tracked.T_world_camera, covariance_of(tracked), out);
+    const Vec3 step =
+        tracked.T_world_camera.translation() - tracked.reference->T_world_camera.translation();
+    set_pose(tracked.T_world_camera, covariance_of(tracked),
+             carried(tracked.reference->covariance, step), out);
     map(std::move(tracked), right);
     out->state = state_of(*out, t, right_problem);
     out->reason = reason_of(*out, t, right_problem);
@@ -158,11 +162,7 @@ class StereoOdometry::Impl {
     const TrackingResult& t = tracked.tracking;
     const double noise = std::max(t.rmse * t.rmse, 1.0) * kCorrelatedPixels;
     const Mat6 information = t.information / noise + 1e-6 * Mat6::Identity();
-    Mat6 rotate = Mat6::Zero();
-    const Mat3 R = tracked.T_world_camera.rotation_matrix();
-    rotate.topLeftCorner<3, 3>() = R;
-    rotate.bottomRightCorner<3, 3>() = R;
-    return rotate * information.inverse() * rotate.transpose();
+    return rotated(tracked.T_world_camera.rotation(), information.inverse());
   }
 
   void lose(OdometryOutput* out) {
@@ -225,10 +225,14 @@ class StereoOdometry::Impl {
     out->keyframes = map_keyframes_;
   }
 
-  void set_pose(const SE3& T_odom_left, const Mat6& covariance, OdometryOutput* out) {
+  /// `frame`: covariance of the frame's own alignment; `inherited`: of what it hangs on, but for
+  /// the scale's part.
+  void set_pose(const SE3& T_odom_left, const Mat6& frame, const Mat6& inherited,
+                OdometryOutput* out) {
     out->pose_valid = true;
     out->T_odom_left = T_odom_left;
-    out->pose_covariance = covariance;
+    out->frame_covariance = frame;
+    out->pose_covariance = frame + inherited;
     const ScaleStatus scale = segment_->scale_status();
     out->scale_valid = scale.locked;
     out->log_scale = scale.log_scale;
@@ -239,15 +243,25 @@ class StereoOdometry::Impl {
     if (scale.accepted_stamp_ns != 0) {
       out->scale_age_s = kNanosecond * static_cast<double>(out->stamp_ns - scale.accepted_stamp_ns);
     }
-    if (published_) {
-      const double dt = kNanosecond * static_cast<double>(out->stamp_ns - published_->stamp_ns);
-      const SE3 step = published_->T_odom_left.inverse() * T_odom_left;
-      out->velocity = step.log() / dt;
-      out->velocity_covariance = 2.0 * covariance / (dt * dt);
-      distance_ += step.translation().norm();
-    }
-    published_ = TrajectoryPose{out->stamp_ns, T_odom_left};
+    const Vec3 since = T_odom_left.translation() - scale.path_until;
+    out->pose_covariance.topLeftCorner<3, 3>() +=
+        scale.path_covariance + scale.sigma * scale.sigma * since * since.transpose();
+    if (published_) set_velocity(scale.sigma, out);
+    published_ = Published{out->stamp_ns, T_odom_left, frame};
     last_pose_ = T_odom_left;
+  }
+
+  /// From the frame before to this one; both alignments err, and the scale does.
+  void set_velocity(double log_scale_sigma, OdometryOutput* out) {
+    const double dt = kNanosecond * static_cast<double>(out->stamp_ns - published_->stamp_ns);
+    const SE3 step = published_->T_odom_left.inverse() * out->T_odom_left;
+    out->velocity = step.log() / dt;
+    const SO3 R_left_odom = out->T_odom_left.rotation().inverse();
+    out->velocity_covariance =
+        rotated(R_left_odom, published_->frame_covariance + out->frame_covariance) / (dt * dt);
+    const Vec3 error = log_scale_sigma * out->velocity.head<3>();
+    out->velocity_covariance.topLeftCorner<3, 3>() += error * error.transpose();
+    distance_ += step.translation().norm();
   }
 
   OdometryState state_of(const OdometryOutput& out, const TrackingResult& t,
@@ -290,7 +304,12 @@ class StereoOdometry::Impl {
   std::uint32_t next_segment_ = 0;
   TrajectoryRecorder recorder_;
   std::optional<std::int64_t> last_stamp_ns_;
-  std::optional<TrajectoryPose> published_;
+  struct Published {
+    std::int64_t stamp_ns = 0;
+    SE3 T_odom_left;
+    Mat6 frame_covariance = Mat6::Zero();
+  };
+  std::optional<Published> published_;
   SE3 last_pose_;
   double distance_ = 0.0;
   int failures_ = 0;

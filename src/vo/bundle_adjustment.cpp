@@ -15,6 +15,10 @@ namespace {
 constexpr double kGaugePose = 1e11;
 constexpr double kGaugeBrightness = 1e10;
 
+/// Residuals of neighbouring pixels, and of a point's keyframes, err alike: so many count as one.
+constexpr double kCorrelatedResiduals = 8.0;
+constexpr double kMinPixelVariance = 1.0;  ///< Of a residual [grey levels squared].
+
 /// Orthonormal basis of the span of at most seven columns; nearly dependent ones add nothing.
 MatX orthonormalized(MatX n) {
   for (Eigen::Index c = 0; c < n.cols(); ++c) {
@@ -125,8 +129,9 @@ MatX BundleAdjuster::removable_gauge(const Window& window, const VecX& units) {
   return orthonormalized(units.cwiseInverse().asDiagonal() * n);
 }
 
-VecX BundleAdjuster::solve(const Window& window, const NormalEquations& system, double lambda,
-                           bool remove_gauge) const {
+BundleAdjuster::ReducedSystem BundleAdjuster::reduced(const Window& window,
+                                                      const NormalEquations& system,
+                                                      double lambda) const {
   MatX H = system.top + window.prior().H;
   VecX b = system.b_top + window.prior().b + window.prior().H * window.stacked_x();
   for (int i = 0; i < window.size(); ++i) {
@@ -137,7 +142,12 @@ VecX BundleAdjuster::solve(const Window& window, const NormalEquations& system, 
   H.diagonal() *= 1.0 + lambda;
   H -= system.schur / (1.0 + lambda);
   b -= system.b_schur / (1.0 + lambda);
+  return {std::move(H), std::move(b)};
+}
 
+VecX BundleAdjuster::solve(const Window& window, const NormalEquations& system, double lambda,
+                           bool remove_gauge) const {
+  auto [H, b] = reduced(window, system, lambda);
   const VecX units = state_units(window);
   H = units.asDiagonal() * H * units.asDiagonal();
   b = units.cwiseProduct(b);
@@ -191,17 +201,51 @@ void BundleAdjuster::drop_bad_residuals(Window* window) const {
   }
 }
 
-void BundleAdjuster::iterate(PhotometricProblem* problem, Window* window, WindowLinearization* now,
-                             BundleResult* result) const {
+Mat6 BundleAdjuster::newest_covariance(const Window& window, const NormalEquations& system) const {
+  const int newest = window.size() - 1;
+  if (newest < 1) return Mat6::Zero();
+  const int before = newest - 1;
+  const VecX units = state_units(window);
+  MatX H = units.asDiagonal() * reduced(window, system, 0.0).H * units.asDiagonal();
+  // The scale of the world about the keyframe before; the pose of that is left out below.
+  const Vec3 centre = window[before].T_world_camera().translation();
+  VecX scale = VecX::Zero(H.rows());
+  for (int i = 0; i <= newest; ++i) {
+    scale.segment<3>(8 * i) = window[i].T_camera_world * centre;
+  }
+  scale = units.cwiseInverse().cwiseProduct(scale);
+  if (scale.norm() > 0.0) {
+    const double held = H.diagonal().segment<8>(8 * newest).maxCoeff();
+    H += held * scale * scale.transpose() / scale.squaredNorm();
+  }
+  std::vector<Eigen::Index> free;
+  for (Eigen::Index i = 0; i < H.rows(); ++i) {
+    if (i < 8 * before || i >= 8 * before + 6) free.push_back(i);
+  }
+  const MatX A = H(free, free);
+  const Eigen::Index n = A.rows();
+  MatX columns = MatX::Zero(n, 6);  // of the newest pose: the last eight but its a and b
+  columns.block<6, 6>(n - 8, 0).setIdentity();
+  const Mat6 unit_free = solve_symmetric_columns(A, columns).block<6, 6>(n - 8, 0);
+  const Vec6 unit = units.segment<6>(8 * newest);
+  const Mat6 covariance = unit.asDiagonal() * unit_free * unit.asDiagonal();
+  const bool usable = covariance.allFinite() && covariance.diagonal().minCoeff() > 0.0;
+  return usable ? Mat6(0.5 * (covariance + covariance.transpose())) : Mat6(Mat6::Zero());
+}
+
+NormalEquations BundleAdjuster::iterate(PhotometricProblem* problem, Window* window,
+                                        WindowLinearization* now, BundleResult* result) const {
+  NormalEquations solved;
   WindowLinearization next;
   double energy = now->energy + prior_energy(*window);
   double lambda = config_.damping;
   const int max_iterations = window->size() < 4 ? 15 : config_.max_iterations;
   for (int i = 0; i < max_iterations; ++i) {
-    const VecX dx = solve(*window, now->system, lambda, i >= 2);
+    solved = now->system;
+    const VecX dx = solve(*window, solved, lambda, i >= 2);
     if (!dx.allFinite()) {
       result->finite = false;
-      return;
+      return solved;
     }
     const Backup backup(*window, problem->points());
     const bool small = apply_step(*now, dx, lambda, problem, window);
@@ -222,6 +266,7 @@ void BundleAdjuster::iterate(PhotometricProblem* problem, Window* window, Window
     }
     if (last) break;
   }
+  return solved;
 }
 
 BundleResult BundleAdjuster::optimize(Window* window) {
@@ -234,7 +279,7 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   problem.linearize(known, {.system = false, .targets = 1U << newest}, &now);
   update_outlier_threshold(now, window);
   problem.linearize(known, {}, &now);
-  iterate(&problem, window, &now, &result);
+  const NormalEquations solved = iterate(&problem, window, &now, &result);
   if (!result.finite) return result;
 
   window->newest().freeze();
@@ -251,6 +296,8 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   result.points = static_cast<int>(problem.points().size());
   result.rmse = std::sqrt(energy / std::max(1, kPatternSize * result.residuals));
   result.finite = std::isfinite(result.rmse);
+  const double variance = std::max(result.rmse * result.rmse, kMinPixelVariance);
+  result.newest_covariance = kCorrelatedResiduals * variance * newest_covariance(*window, solved);
   drop_bad_residuals(window);
   return result;
 }

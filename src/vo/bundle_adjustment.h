@@ -23,6 +23,10 @@ struct BundleResult {
   int points = 0;
   int residuals = 0;
   bool finite = true;  ///< False: the solve broke down; the window must be thrown away.
+  /// Covariance of the newest keyframe's pose as seen from the keyframe before it (left
+  /// perturbation of T_newest_before: translation, rotation), the window's scale held. Of two
+  /// keyframes or more.
+  Mat6 newest_covariance = Mat6::Zero();
 };
 
 /// Photometric bundle adjustment over the sliding window by Levenberg-Marquardt: poses,
@@ -43,6 +47,10 @@ class BundleAdjuster {
   VecX solve(const Window& window, const NormalEquations& system, double lambda,
              bool remove_gauge) const;
 
+  /// Covariance as in `BundleResult`, for residuals of unit noise. Zero when the system does not
+  /// tell it.
+  Mat6 newest_covariance(const Window& window, const NormalEquations& system) const;
+
   /// Orthonormal basis of the seven gauge directions (motion and scale of the world) at the
   /// linearization points, in states divided by `state_units`.
   static MatX gauge_basis(const Window& window, const VecX& state_units);
@@ -56,14 +64,21 @@ class BundleAdjuster {
   static VecX state_units(const Window& window);
 
  private:
+  /// Poses and brightnesses alone, the depths eliminated, with the priors on them: H x = -b.
+  struct ReducedSystem {
+    MatX H;
+    VecX b;
+  };
+  ReducedSystem reduced(const Window& window, const NormalEquations& system, double lambda) const;
   /// Sets the newest keyframe's outlier threshold from the energies of the residuals into it.
   void update_outlier_threshold(const WindowLinearization& linearized, Window* window) const;
   /// Applies the step to poses and, by back-substitution, to depths. True when all are small.
   bool apply_step(const WindowLinearization& at, const VecX& dx, double lambda,
                   PhotometricProblem* problem, Window* window) const;
-  /// Levenberg-Marquardt iterations from `now`, which follows the accepted estimate.
-  void iterate(PhotometricProblem* problem, Window* window, WindowLinearization* now,
-               BundleResult* result) const;
+  /// Levenberg-Marquardt iterations from `now`, which follows the accepted estimate. Returns the
+  /// last system that was solved.
+  NormalEquations iterate(PhotometricProblem* problem, Window* window, WindowLinearization* now,
+                          BundleResult* result) const;
   void drop_bad_residuals(Window* window) const;
 
   WindowConfig config_;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "sovo/geometry/pose_covariance.h"
 #include "sovo/vo/epipolar_search.h"
 #include "sovo/vo/keyframe_policy.h"
 #include "sovo/vo/marginalization.h"
@@ -124,6 +125,7 @@ void DirectOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
   keyframes_.clear();
   marginalized_.clear();
   snapshot_.reset();
+  covariance_.setZero();
   past_.clear();
   has_first_rmse_ = false;
   last_affine_ = {};
@@ -211,6 +213,7 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
       !result.bundle.finite || result.bundle.rmse > kMaxBundleRmse || result.bundle.residuals < 100;
   if (result.failed) return result;
 
+  extend_covariance(result.bundle.newest_covariance);
   for (int h = 0; h < window_.size(); ++h) {
     for (Point& p : window_[h].points) {
       p.remove = h + 1 < window_.size() && p.count(ResidualState::kIn) == 0;
@@ -310,9 +313,18 @@ std::vector<WindowPose> DirectOdometry::window_poses() const {
   return poses;
 }
 
+/// From the keyframe before to the newest: the errors of steps are taken as independent.
+void DirectOdometry::extend_covariance(const Mat6& newest_covariance) {
+  const SE3 newest = window_.newest().T_world_camera();
+  const SE3 before = window_[window_.size() - 2].T_world_camera();
+  covariance_ = carried(covariance_, newest.translation() - before.translation()) +
+                rotated(newest.rotation(), newest_covariance);
+}
+
 void DirectOdometry::publish_reference() {
   auto next = std::make_shared<TrackingReference>(build_tracking_reference(window_, num_levels_));
   next->log_scale = log_scale_;
+  next->covariance = covariance_;
   const std::lock_guard lock(reference_mutex_);
   reference_ = std::move(next);
 }
@@ -363,6 +375,8 @@ double DirectOdometry::apply(const ScaleCorrection& correction) {
   const double scale = std::exp(log_scale);
   const Vec3 centre = window_.newest().T_world_camera().translation();
   window_.apply_similarity(scale);
+  covariance_.topRows<3>() *= scale;
+  covariance_.leftCols<3>() *= scale;
   log_scale_ += log_scale;
   if (correction.first_lock) {
     keyframes_.rescale_all(window_poses(), scale, centre, log_scale_);

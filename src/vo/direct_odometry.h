@@ -131,6 +131,7 @@ class DirectOdometry {
   std::vector<KeyframeState> marginalize(const MapTimer& timer);
   void keep_point(const Point& point, double rho_unit, KeyframePoints* points) const;
   KeyframeState state_without_active_points(const Keyframe& keyframe) const;
+  void extend_covariance(const Mat6& newest_covariance);
   void publish_reference();
   std::vector<WindowPose> window_poses() const;
   void take_snapshot();
@@ -155,6 +156,8 @@ class DirectOdometry {
   std::vector<double> epoch_log_scale_;  ///< log_scale_ at each epoch.
   std::optional<KeyframeSnapshot> snapshot_;
   KeyframePoses keyframes_;
+  /// Of the newest keyframe's pose since the map began, as in `TrackingReference`.
+  Mat6 covariance_ = Mat6::Zero();
   std::map<std::uint32_t, KeyframePoints> marginalized_;  ///< By the window's keyframes.
 
   // Shared: the reference.

@@ -25,7 +25,9 @@ struct TrackingReference {
   Affine affine;
   double log_scale = 0.0;  ///< Sum of the similarities applied before it was built.
   SE3 T_world_camera;      ///< Of the keyframe when it was built.
-  double mean_rho = 1.0;   ///< Mean inverse depth of the level-0 points [1/m].
+  /// Of that pose, since the map began: (translation, rotation) in world axes, without the scale's.
+  Mat6 covariance = Mat6::Zero();
+  double mean_rho = 1.0;  ///< Mean inverse depth of the level-0 points [1/m].
   std::vector<ReferenceLevel> levels;
   std::size_t num_window_points = 0;  ///< Points that were splatted.
   /// Poses T_world_camera of all keyframes of the window, by id: earlier frames hang on them.

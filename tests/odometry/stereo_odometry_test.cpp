@@ -62,6 +62,31 @@ TEST(StereoOdometry, FollowsADriveInMetres) {
   }
 }
 
+TEST(StereoOdometry, CovarianceGrowsWithTheWay) {
+  Playback run(test_config());
+  run.give_drive(0, kDriveFrames);
+  run.odometry.finish();
+  const std::vector<OdometryOutput>& frames = run.recorder.frames;
+  EXPECT_TRUE(frames[0].pose_covariance.isZero(0.0)) << "the first pose is the origin";
+  Vec6 inherited = Vec6::Zero();
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    const Mat6 part = frames[i].pose_covariance - frames[i].frame_covariance;
+    // That of positions may fall again: the scale is known better when it has been measured.
+    EXPECT_GE((part.diagonal() - inherited).tail<3>().minCoeff(), -1e-15) << "frame " << i;
+    inherited = part.diagonal();
+    EXPECT_GT(frames[i].frame_covariance.diagonal().minCoeff(), 0.0);
+    EXPECT_GT(frames[i].velocity_covariance.diagonal().minCoeff(), 0.0);
+  }
+  EXPECT_GT(inherited.minCoeff(), 0.0);
+  const OdometryOutput& last = frames.back();
+  const double length = last.T_odom_left.translation().norm();
+  const double sigma = std::sqrt(inherited.head<3>().sum());
+  EXPECT_LT(sigma, 0.05 * length);
+  const Vec3 error =
+      last.T_odom_left.translation() - (drive(0).inverse() * drive(kDriveFrames - 1)).translation();
+  EXPECT_LT(error.norm(), 5.0 * std::sqrt(last.pose_covariance.diagonal().head<3>().sum()));
+}
+
 TEST(StereoOdometry, RepeatedRunIsTheSameToTheLastBitWithOneThreadOrTwo) {
   std::vector<std::vector<TrajectoryPose>> results;
   for (const int threads : {1, 1, 2}) {

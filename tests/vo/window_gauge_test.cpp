@@ -108,6 +108,60 @@ TEST_F(WindowGauge, StepWithoutGaugeIsOrthogonalToIt) {
   EXPECT_LT((basis.transpose() * step).norm(), 1e-9 * step.norm() + 1e-12);
 }
 
+/// The covariance of the newest pose as seen from the one before, from the pseudo-inverse.
+Mat6 by_pseudo_inverse(const Window& window, const MatX& H, const VecX& units) {
+  const Eigen::SelfAdjointEigenSolver<MatX> eigen(H);
+  MatX inverse = MatX::Zero(H.rows(), H.cols());
+  for (Eigen::Index i = 7; i < H.rows(); ++i) {
+    const VecX v = eigen.eigenvectors().col(i);
+    inverse += v * v.transpose() / eigen.eigenvalues()[i];
+  }
+  const Eigen::Index n = H.rows();
+  MatX J = MatX::Zero(6, n);
+  const SE3 T_newest_before =
+      window.newest().T_camera_world * window[window.size() - 2].T_world_camera();
+  J.block<6, 6>(0, n - 8).setIdentity();
+  J.block<6, 6>(0, n - 16) = -T_newest_before.adjoint();
+  J = J * units.asDiagonal();
+  return J * inverse * J.transpose();
+}
+
+TEST_F(WindowGauge, NewestPoseAsSeenFromTheOneBeforeHasTheCovarianceOfThePseudoInverse) {
+  const NormalEquations system = linearized_system();
+  const BundleAdjuster adjuster(WindowConfig(), &pool_);
+  const VecX units = BundleAdjuster::state_units(window_);
+  MatX H = system.top - system.schur;
+  for (int i = 0; i < window_.size(); ++i) {
+    H.diagonal().segment<8>(8 * i) += frame_prior(window_[i], WindowConfig()).weight;
+  }
+  const Mat6 expected =
+      by_pseudo_inverse(window_, units.asDiagonal() * H * units.asDiagonal(), units);
+  const Mat6 found = adjuster.newest_covariance(window_, system);
+  const Mat3 expected_rotation = expected.bottomRightCorner<3, 3>();
+  const Mat3 found_rotation = found.bottomRightCorner<3, 3>();
+  EXPECT_TRUE(found_rotation.isApprox(expected_rotation, 1e-4));
+  // Along the step lies its scale, which the one holds and the other shares out.
+  const SE3 T_newest_before =
+      window_.newest().T_camera_world * window_[window_.size() - 2].T_world_camera();
+  const Vec3 along = T_newest_before.translation().normalized();
+  const Mat3 across = Mat3::Identity() - along * along.transpose();
+  const Mat3 found_across = across * found.topLeftCorner<3, 3>() * across;
+  const Mat3 expected_across = across * expected.topLeftCorner<3, 3>() * across;
+  EXPECT_GT(expected_across.norm(), 0.0);
+  EXPECT_TRUE(found_across.isApprox(expected_across, 1e-4)) << found_across << "\n\n"
+                                                            << expected_across;
+}
+
+TEST_F(WindowGauge, CovarianceOfTheNewestPoseScalesWithTheWorld) {
+  const BundleAdjuster adjuster(WindowConfig(), &pool_);
+  Mat6 before = adjuster.newest_covariance(window_, linearized_system());
+  window_.apply_similarity(3.0);
+  before.topRows<3>() *= 3.0;
+  before.leftCols<3>() *= 3.0;
+  const Mat6 after = adjuster.newest_covariance(window_, linearized_system());
+  EXPECT_TRUE(after.isApprox(before, 1e-3)) << after << "\n\n" << before;
+}
+
 class Similarity : public WindowGauge, public ::testing::WithParamInterface<double> {};
 
 TEST_P(Similarity, LeavesEnergyPriorAndStepUnchanged) {

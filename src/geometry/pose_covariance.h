@@ -5,7 +5,8 @@
 namespace sovo {
 
 // Covariances of poses T_world_body, of (translation, rotation) about fixed world axes: the true
-// position is p + dp, the true rotation exp(dtheta) R.
+// position is p + dp, the true rotation exp(dtheta) R. Where steps err independently, their
+// covariances are summed as seen from the origin, `carried` by -p, where none has to be carried on.
 
 /// That of (translation, rotation) in a body's axes, seen in those of the world.
 inline Mat6 rotated(const SO3& R_world_body, const Mat6& covariance) {

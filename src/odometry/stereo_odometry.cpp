@@ -148,10 +148,8 @@ class StereoOdometry::Impl {
     out->keyframe_id = tracked.reference->keyframe_id;
     out->inliers = static_cast<std::uint32_t>(t.inliers);
     out->residual = t.rmse;
-    const Vec3 step =
-        tracked.T_world_camera.translation() - tracked.reference->T_world_camera.translation();
     set_pose(tracked.T_world_camera, covariance_of(tracked),
-             carried(tracked.reference->covariance, step), out);
+             carried(tracked.reference->covariance, tracked.T_world_camera.translation()), out);
     map(std::move(tracked), right);
     out->state = state_of(*out, t, right_problem);
     out->reason = reason_of(*out, t, right_problem);

@@ -316,9 +316,15 @@ std::vector<WindowPose> DirectOdometry::window_poses() const {
 /// From the keyframe before to the newest: the errors of steps are taken as independent.
 void DirectOdometry::extend_covariance(const Mat6& newest_covariance) {
   const SE3 newest = window_.newest().T_world_camera();
-  const SE3 before = window_[window_.size() - 2].T_world_camera();
-  covariance_ = carried(covariance_, newest.translation() - before.translation()) +
-                rotated(newest.rotation(), newest_covariance);
+  covariance_ += carried(rotated(newest.rotation(), newest_covariance), -newest.translation());
+}
+
+/// When the unit of the whole map changes. Later corrections are errors, which its sigma counts.
+void DirectOdometry::rescale_covariance(double scale, const Vec3& centre) {
+  covariance_ = carried(covariance_, centre);
+  covariance_.topRows<3>() *= scale;
+  covariance_.leftCols<3>() *= scale;
+  covariance_ = carried(covariance_, -centre);
 }
 
 void DirectOdometry::publish_reference() {
@@ -375,17 +381,17 @@ double DirectOdometry::apply(const ScaleCorrection& correction) {
   const double scale = std::exp(log_scale);
   const Vec3 centre = window_.newest().T_world_camera().translation();
   window_.apply_similarity(scale);
-  covariance_.topRows<3>() *= scale;
-  covariance_.leftCols<3>() *= scale;
   log_scale_ += log_scale;
   if (correction.first_lock) {
     keyframes_.rescale_all(window_poses(), scale, centre, log_scale_);
+    rescale_covariance(scale, centre);
   } else {
     keyframes_.rescale(window_poses(), scale, log_scale_);
   }
   ++scale_epoch_;
   epoch_log_scale_.push_back(log_scale_);
   auto next = std::make_shared<TrackingReference>(rescaled(*reference(), scale));
+  next->covariance = covariance_;
   const std::lock_guard lock(reference_mutex_);
   reference_ = std::move(next);
   return log_scale;

@@ -132,6 +132,7 @@ class DirectOdometry {
   void keep_point(const Point& point, double rho_unit, KeyframePoints* points) const;
   KeyframeState state_without_active_points(const Keyframe& keyframe) const;
   void extend_covariance(const Mat6& newest_covariance);
+  void rescale_covariance(double scale, const Vec3& centre);
   void publish_reference();
   std::vector<WindowPose> window_poses() const;
   void take_snapshot();

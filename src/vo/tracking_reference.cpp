@@ -283,8 +283,6 @@ TrackingReference rescaled(const TrackingReference& reference, double scale) {
   for (auto& [id, T] : out.keyframe_poses) {
     T.translation() = centre + scale * (T.translation() - centre);
   }
-  out.covariance.topRows<3>() *= scale;
-  out.covariance.leftCols<3>() *= scale;
   out.mean_rho /= scale;
   out.log_scale += std::log(scale);
   return out;

@@ -25,7 +25,8 @@ struct TrackingReference {
   Affine affine;
   double log_scale = 0.0;  ///< Sum of the similarities applied before it was built.
   SE3 T_world_camera;      ///< Of the keyframe when it was built.
-  /// Of that pose, since the map began: (translation, rotation) in world axes, without the scale's.
+  /// Of that pose, since the map began: (translation, rotation) in world axes, carried to the
+  /// origin (geometry/pose_covariance.h). Without what errors of scale add.
   Mat6 covariance = Mat6::Zero();
   double mean_rho = 1.0;  ///< Mean inverse depth of the level-0 points [1/m].
   std::vector<ReferenceLevel> levels;

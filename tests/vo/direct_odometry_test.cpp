@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "sovo/geometry/pose_covariance.h"
 #include "vo/window_test_support.h"
 
 namespace sovo {
@@ -110,6 +111,26 @@ TEST_F(Map, GrowsAlongADriveAndKeepsItsScaleInEverySimilarity) {
   EXPECT_GE(keyframes, 4);
   EXPECT_LE(vo_.window().size(), DirectConfig().keyframe.max_keyframes);
   EXPECT_EQ(vo_.keyframes().size(), static_cast<std::size_t>(keyframes));
+}
+
+TEST_F(Map, CovarianceIsCarriedOverEachStepAndGrowsByIt) {
+  EXPECT_TRUE(vo_.reference()->covariance.isZero(0.0)) << "the first keyframe is the origin";
+  Mat6 before = Mat6::Zero();  // of the keyframe before, where it is
+  Vec3 position = vo_.reference()->T_world_camera.translation();
+  int steps = 0;
+  for (int i = 1; i <= 24; ++i) {
+    const MapResult result = vo_.map(vo_.track(frame_at(scene_, drive(i), i)), nullptr, nullptr);
+    if (!result.is_keyframe) continue;
+    ++steps;
+    const SE3 newest = vo_.reference()->T_world_camera;
+    const Mat6 step = rotated(newest.rotation(), result.bundle.newest_covariance);
+    EXPECT_GT(step.diagonal().minCoeff(), 0.0);
+    const Mat6 expected = carried(before, newest.translation() - position) + step;
+    before = carried(vo_.reference()->covariance, newest.translation());
+    position = newest.translation();
+    EXPECT_TRUE(before.isApprox(expected, 1e-9)) << before << "\n\n" << expected;
+  }
+  EXPECT_GE(steps, 3);
 }
 
 TEST_F(Map, BeginsAnewWithoutWhatItHeld) {

@@ -87,6 +87,24 @@ TEST(StereoOdometry, CovarianceGrowsWithTheWay) {
   EXPECT_LT(error.norm(), 5.0 * std::sqrt(last.pose_covariance.diagonal().head<3>().sum()));
 }
 
+TEST(StereoOdometry, CovarianceOfTheTwistCountsBothAlignmentsInTheCamerasAxes) {
+  Playback run(test_config());
+  run.give_drive(0, 8);
+  const OdometryOutput& before = run.recorder.frames[6];
+  const OdometryOutput& last = run.recorder.frames[7];
+  const double dt = 1e-9 * static_cast<double>(last.stamp_ns - before.stamp_ns);
+  const Mat3 R = last.T_odom_left.rotation_matrix();
+  const Mat6 sum = before.frame_covariance + last.frame_covariance;
+  const Mat3 angular = R.transpose() * sum.bottomRightCorner<3, 3>() * R / (dt * dt);
+  const Mat3 claimed = last.velocity_covariance.bottomRightCorner<3, 3>();
+  EXPECT_TRUE(claimed.isApprox(angular, 1e-9)) << claimed << "\n\n" << angular;
+  const Vec3 v = last.velocity.head<3>();
+  const Mat3 linear = R.transpose() * sum.topLeftCorner<3, 3>() * R / (dt * dt) +
+                      std::pow(last.log_scale_sigma, 2) * v * v.transpose();
+  const Mat3 claimed_linear = last.velocity_covariance.topLeftCorner<3, 3>();
+  EXPECT_TRUE(claimed_linear.isApprox(linear, 1e-9)) << claimed_linear << "\n\n" << linear;
+}
+
 TEST(StereoOdometry, RepeatedRunIsTheSameToTheLastBitWithOneThreadOrTwo) {
   std::vector<std::vector<TrajectoryPose>> results;
   for (const int threads : {1, 1, 2}) {

@@ -45,8 +45,8 @@ const std::vector<Column>& columns() {
       {"scale %", "scale_median", &SyntheticResult::scale_median, 100.0, 3, false},
       {"p95 %", "scale_p95", &SyntheticResult::scale_p95, 100.0, 3, false},
       {"NEES", "scale_nees", &SyntheticResult::scale_nees, 1.0, 2, false},
-      {"1 s", "pose_nees_1s", &SyntheticResult::pose_nees_1s, 1.0, 2, false},
-      {"10 m", "pose_nees_10m", &SyntheticResult::pose_nees_10m, 1.0, 2, false},
+      {"NEES 1 s", "pose_nees_1s", &SyntheticResult::pose_nees_1s, 1.0, 2, false},
+      {"NEES 10 m", "pose_nees_10m", &SyntheticResult::pose_nees_10m, 1.0, 2, false},
       {"kf/frame", "keyframes_per_frame", &SyntheticResult::keyframes_per_frame, 1.0, 2, false},
       {"ms/frame", "frame_ms", &SyntheticResult::frame_ms, 1.0, 1, false},
   };

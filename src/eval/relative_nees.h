@@ -27,7 +27,8 @@ struct PairDistance {
 };
 
 /// Mean of e^T C^-1 e / 6 over all pairs, e being the error of a relative pose: 1 when honest,
-/// above when optimistic. NaN when there is no pair.
+/// above when optimistic. NaN when there is no pair, or what is claimed of one is no
+/// positive definite matrix.
 double relative_nees(std::span<const UncertainPose> poses, const Trajectory& truth,
                      const PairDistance& distance);
 

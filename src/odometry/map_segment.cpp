@@ -324,18 +324,22 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
     record.correction = vo_.apply(correction);
     if (correction.first_lock) refined_until_ = 0;  // it rescales what was built before
   }
-  extend_scale_path(position, filter_.locked() && !was_locked);
+  if (filter_.locked() && !was_locked) {
+    // All that was built before took this scale at once, about the newest keyframe.
+    scale_path_covariance_.setZero();
+    scale_path_until_ =
+        position - std::exp(record.correction) * (position - T_odom_left_start_.translation());
+  }
+  extend_scale_path(position);
   publish_scale(&record, update.apply);
   return record;
 }
 
 /// The filter's `path_sigma` is made for steps that are summed as if their errors were independent.
-void MapSegment::extend_scale_path(const Vec3& position, bool first_lock) {
+void MapSegment::extend_scale_path(const Vec3& position) {
   const Vec3 step = position - scale_path_until_;
   const double sigma = filter_.path_sigma();
   scale_path_until_ = position;
-  // Before the lock there were no metres.
-  if (first_lock) scale_path_covariance_.setZero();
   if (filter_.locked()) scale_path_covariance_ += sigma * sigma * step * step.transpose();
 }
 

@@ -18,8 +18,6 @@ namespace {
 /// Tracking with a residual this many times the usual one, or so few inliers, is DEGRADED.
 constexpr double kDegradedInliers = 0.5;
 constexpr double kNanosecond = 1e-9;
-/// Pixels of the reference are neighbours and filled in from few points: so many count as one.
-constexpr double kCorrelatedPixels = 8.0;
 
 }  // namespace
 
@@ -158,8 +156,7 @@ class StereoOdometry::Impl {
   /// Covariance of (translation, rotation) of the pose in odom axes, from this frame's alignment.
   static Mat6 covariance_of(const TrackedFrame& tracked) {
     const TrackingResult& t = tracked.tracking;
-    const double noise = std::max(t.rmse * t.rmse, 1.0) * kCorrelatedPixels;
-    const Mat6 information = t.information / noise + 1e-6 * Mat6::Identity();
+    const Mat6 information = t.information / independent_variance(t.rmse) + 1e-6 * Mat6::Identity();
     return rotated(tracked.T_world_camera.rotation(), information.inverse());
   }
 

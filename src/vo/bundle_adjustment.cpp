@@ -15,10 +15,6 @@ namespace {
 constexpr double kGaugePose = 1e11;
 constexpr double kGaugeBrightness = 1e10;
 
-/// Residuals of neighbouring pixels, and of a point's keyframes, err alike: so many count as one.
-constexpr double kCorrelatedResiduals = 8.0;
-constexpr double kMinPixelVariance = 1.0;  ///< Of a residual [grey levels squared].
-
 /// Orthonormal basis of the span of at most seven columns; nearly dependent ones add nothing.
 MatX orthonormalized(MatX n) {
   for (Eigen::Index c = 0; c < n.cols(); ++c) {
@@ -296,8 +292,7 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   result.points = static_cast<int>(problem.points().size());
   result.rmse = std::sqrt(energy / std::max(1, kPatternSize * result.residuals));
   result.finite = std::isfinite(result.rmse);
-  const double variance = std::max(result.rmse * result.rmse, kMinPixelVariance);
-  result.newest_covariance = kCorrelatedResiduals * variance * newest_covariance(*window, solved);
+  result.newest_covariance = independent_variance(result.rmse) * newest_covariance(*window, solved);
   drop_bad_residuals(window);
   return result;
 }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+
 #include "sovo/vo/direct_config.h"
 #include "sovo/vo/normal_equations.h"
 #include "sovo/vo/photometric_problem.h"
@@ -17,6 +19,14 @@ struct FramePrior {
 /// Prior of a keyframe: the first of a map holds the gauge, each holds its brightness near zero.
 FramePrior frame_prior(const Keyframe& keyframe, const WindowConfig& config);
 
+/// What a pose's covariance for residuals of unit noise is to be multiplied with [grey levels
+/// squared], from their RMS: neighbouring pixels, and a point's keyframes, err alike, so that eight
+/// residuals count as one.
+inline double independent_variance(double rmse) {
+  constexpr double kCorrelatedResiduals = 8.0;
+  return kCorrelatedResiduals * std::max(rmse * rmse, 1.0);
+}
+
 struct BundleResult {
   double rmse = 0.0;  ///< Of the residuals, an outlier counting its threshold [grey levels].
   int iterations = 0;
@@ -24,8 +34,8 @@ struct BundleResult {
   int residuals = 0;
   bool finite = true;  ///< False: the solve broke down; the window must be thrown away.
   /// Covariance of the newest keyframe's pose as seen from the keyframe before it (left
-  /// perturbation of T_newest_before: translation, rotation), the window's scale held. Of two
-  /// keyframes or more.
+  /// perturbation of T_newest_before: translation [the window's unit], rotation [rad]), the
+  /// window's scale held. Of two keyframes or more.
   Mat6 newest_covariance = Mat6::Zero();
 };
 

@@ -32,7 +32,7 @@ constexpr double kExplainsNothing = 1e9;
 constexpr std::size_t kFavourites = 4;    ///< Motions looked at again for each that is kept.
 constexpr std::size_t kRankPoints = 500;  ///< Of a level: enough to compare motions, of thousands.
 
-/// Every n-th point, so that few more than `most` are left.
+/// Every n-th point, so that less than twice `most` are left.
 ReferenceLevel thinned(const ReferenceLevel& all, std::size_t most) {
   const std::size_t stride = std::max<std::size_t>(1, all.size() / most);
   ReferenceLevel out;

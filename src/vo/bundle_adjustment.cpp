@@ -275,11 +275,14 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   problem.linearize(known, {.system = false, .targets = 1U << newest}, &now);
   update_outlier_threshold(now, window);
   problem.linearize(known, {}, &now);
+  const SE3 oldest = (*window)[0].T_world_camera();
   const NormalEquations solved = iterate(&problem, window, &now, &result);
   if (!result.finite) return result;
 
   window->newest().freeze();
-  window->update_geometry();
+  // A step without gauge moves all keyframes by their share of what the newest one needs: what
+  // tracking errs alike each time would drive the world along.
+  window->hold_oldest(oldest);
   update_outlier_threshold(now, window);
   problem.reclassify(&now);
   problem.write_back(now);

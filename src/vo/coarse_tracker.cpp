@@ -31,6 +31,7 @@ struct Ranked {
 constexpr double kExplainsNothing = 1e9;
 constexpr std::size_t kFavourites = 4;    ///< Motions looked at again for each that is kept.
 constexpr std::size_t kRankPoints = 500;  ///< Of a level: enough to compare motions, of thousands.
+constexpr std::size_t kMotionPoints = 256;  ///< At least: their mean motion decides on keyframes.
 
 /// Every n-th point, so that less than twice `most` are left.
 ReferenceLevel thinned(const ReferenceLevel& all, std::size_t most) {
@@ -331,7 +332,7 @@ std::vector<SE3> CoarseTracker::rank(const TrackingReference& reference,
 
 PointMotion motion_of_points(const TrackingReference& reference, const SE3& T_current_reference) {
   const ReferenceLevel& level = reference.levels[0];
-  constexpr std::size_t kStride = 32;
+  const std::size_t stride = std::max<std::size_t>(1, level.size() / kMotionPoints);
   const Mat3 K = level.camera.matrix();
   const Mat3 KRKi = K * T_current_reference.rotation_matrix() * K.inverse();
   const Vec3 Kt = K * T_current_reference.translation();
@@ -342,7 +343,7 @@ PointMotion motion_of_points(const TrackingReference& reference, const SE3& T_cu
     const double dv = p.y() / p.z() - from.y();
     return du * du + dv * dv;
   };
-  for (std::size_t i = 0; i < level.size(); i += kStride) {
+  for (std::size_t i = 0; i < level.size(); i += stride) {
     const Vec3 p(level.u[i], level.v[i], 1.0);
     const Vec3 kt = Kt * level.rho[i];
     sum.flow_translation += flow(p + kt, p) + flow(p - kt, p);

@@ -113,10 +113,10 @@ void prefetch_pattern(const Window& window, int target, const PatternProjection&
   const ImageF& image = window[target].image();
   const std::ptrdiff_t w = image.width();
   // Rows -2 to 2 of the pattern, and those around them for gradients.
-  const float* centre = image.data() + projection.offset[kPatternCentre];
+  const float* left = image.data() + projection.offset[kPatternLeft];
   for (std::ptrdiff_t row = -3; row <= 4; ++row) {
-    __builtin_prefetch(centre + row * w - 3);
-    __builtin_prefetch(centre + row * w + 4);
+    __builtin_prefetch(left + row * w - 1);
+    __builtin_prefetch(left + row * w + 6);
   }
 }
 

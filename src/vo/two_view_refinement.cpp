@@ -6,6 +6,7 @@
 
 #include "sovo/geometry/linear_solvers.h"
 #include "sovo/image/interpolation.h"
+#include "sovo/vo/pattern.h"
 
 namespace sovo {
 namespace {
@@ -13,8 +14,6 @@ namespace {
 using Vec8f = Eigen::Matrix<float, 8, 1>;
 using Mat8f = Eigen::Matrix<float, 8, 8>;
 
-constexpr std::array<std::array<float, 2>, 8> kPattern = {
-    {{0, -2}, {-1, -1}, {1, -1}, {-2, 0}, {0, 0}, {2, 0}, {-1, 1}, {0, 2}}};
 constexpr float kEnergyOutOfView = 1e9F;
 
 /// Contribution of one point: 8 shared unknowns (x), one of its own (rho).
@@ -52,8 +51,8 @@ bool linearize_point(const Level& level, const TwoViewRefinementConfig& config,
   const float c2 = static_cast<float>(config.gradient_weight * config.gradient_weight);
   for (const auto& offset : kPattern) {
     TwoViewPixel pixel;
-    if (!evaluate_pixel(level.first, level.second, level.camera, state, x + offset[0],
-                        y + offset[1], inverse_depth, &pixel)) {
+    if (!evaluate_pixel(level.first, level.second, level.camera, state, x + offset.x, y + offset.y,
+                        inverse_depth, &pixel)) {
       return false;
     }
     const float magnitude = std::abs(pixel.residual);
@@ -249,7 +248,7 @@ float pattern_energy(const ImageF& first, const ImageF& second, const CameraMode
   float energy = 0.0F;
   for (const auto& offset : kPattern) {
     TwoViewPixel pixel;
-    if (!evaluate_pixel(first, second, camera, state, u + offset[0], v + offset[1], inverse_depth,
+    if (!evaluate_pixel(first, second, camera, state, u + offset.x, v + offset.y, inverse_depth,
                         &pixel)) {
       return std::numeric_limits<float>::infinity();
     }

@@ -170,4 +170,13 @@ void Window::apply_similarity(double scale) {
   update_geometry();
 }
 
+void Window::hold_oldest(const SE3& T_world_camera) {
+  const SE3 move = keyframes_.front()->T_world_camera() * T_world_camera.inverse();
+  for (auto& k : keyframes_) {
+    k->frozen_T_camera_world = k->frozen_T_camera_world * move;
+    k->T_camera_world = k->T_camera_world * move;
+  }
+  update_geometry();
+}
+
 }  // namespace sovo

@@ -175,6 +175,10 @@ class Window {
   /// its displacement. The photometric energy does not change.
   void apply_similarity(double scale);
 
+  /// Moves the world, poses and linearization points alike, so that the oldest keyframe is at
+  /// `T_world_camera`. What keyframes see of each other, and the prior, stay as they are.
+  void hold_oldest(const SE3& T_world_camera);
+
  private:
   void renumber();
 

@@ -85,7 +85,7 @@ TEST_F(Map, GrowsAlongADriveAndKeepsItsScaleInEverySimilarity) {
   double scale = 1.0;
   Vec3 shift = Vec3::Zero();
   int keyframes = 1;
-  for (int i = 1; i <= 24; ++i) {
+  for (int i = 1; i <= 36; ++i) {
     const TrackedFrame tracked = vo_.track(frame_at(scene_, drive(i), i));
     ASSERT_TRUE(tracked.tracking.good) << "frame " << i;
     const Vec3 expected = scale * drive(i).translation() + shift;
@@ -118,7 +118,7 @@ TEST_F(Map, CovarianceIsCarriedOverEachStepAndGrowsByIt) {
   Mat6 before = Mat6::Zero();  // of the keyframe before, where it is
   Vec3 position = vo_.reference()->T_world_camera.translation();
   int steps = 0;
-  for (int i = 1; i <= 24; ++i) {
+  for (int i = 1; i <= 36; ++i) {
     const MapResult result = vo_.map(vo_.track(frame_at(scene_, drive(i), i)), nullptr, nullptr);
     if (!result.is_keyframe) continue;
     ++steps;

@@ -206,6 +206,31 @@ TEST_P(Similarity, LeavesEnergyPriorAndStepUnchanged) {
 
 INSTANTIATE_TEST_SUITE_P(Scales, Similarity, ::testing::Values(0.2, 0.97, 1.05, 7.0));
 
+TEST_F(WindowGauge, HoldingTheOldestKeyframeMovesTheWorldAlone) {
+  displace(1.0, 7, &window_);
+  set_random_prior(8, &window_);
+  const NormalEquations before = linearized_system();
+  const double energy = energy_;
+  const double prior = adjuster_.prior_energy(window_);
+  const VecX step = adjuster_.solve(window_, before, 1e-4, true);
+  const SE3 T_newest_oldest = window_.newest().T_camera_world * window_[0].T_world_camera();
+
+  const SE3 place(SO3::exp(Vec3(0.3, -0.2, 0.5)), Vec3(4.0, -3.0, 2.0));
+  window_.hold_oldest(place);
+  EXPECT_LT((window_[0].T_world_camera().inverse() * place).log().norm(), 1e-12);
+  const SE3 seen = window_.newest().T_camera_world * window_[0].T_world_camera();
+  EXPECT_LT((seen.inverse() * T_newest_oldest).log().norm(), 1e-12);
+
+  const NormalEquations after = linearized_system();
+  EXPECT_NEAR(energy_, energy, 1e-5 * energy);
+  EXPECT_NEAR(adjuster_.prior_energy(window_), prior, 1e-9 * std::abs(prior));
+  const VecX units = BundleAdjuster::state_units(window_).cwiseInverse();
+  EXPECT_LT(
+      relative_difference(units.cwiseProduct(adjuster_.solve(window_, after, 1e-4, true)).eval(),
+                          units.cwiseProduct(step).eval()),
+      2e-3);
+}
+
 TEST_F(WindowGauge, SimilarityScalesImmatureIntervals) {
   ImmaturePoint p;
   p.rho_min = 0.2F;

@@ -32,7 +32,7 @@ struct SyntheticResult {
   double t_rel = 0.0;         ///< Mean over the pieces [1].
   double r_rel = 0.0;         ///< [rad/m]
   double ate_m = 0.0;         ///< RMSE after the best SE(3).
-  double scale_median = 0.0;  ///< |ln s| of the displacement from each keyframe [1].
+  double scale_median = 0.0;  ///< |ln s| of the depths in each keyframe, after its correction [1].
   double scale_p95 = 0.0;
   /// Mean of (ln s / sigma)^2 with the scale's posterior sigma at the keyframe: 1 when honest.
   double scale_nees = 0.0;

@@ -307,6 +307,7 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
   }
   last_keyframe_position_ = position;
 
+  const double sigma_before = filter_.path_sigma();
   const ScaleUpdate update = filter_.update(m);
   ScaleRecord record;
   record.stamp_ns = job.snapshot.stamp_ns;
@@ -324,23 +325,26 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
     record.correction = vo_.apply(correction);
     if (correction.first_lock) refined_until_ = 0;  // it rescales what was built before
   }
-  if (filter_.locked() && !was_locked) {
+  if (was_locked) {
+    extend_scale_path(position, sigma_before);
+  } else if (filter_.locked()) {
     // All that was built before took this scale at once, about the newest keyframe.
     scale_path_covariance_.setZero();
     scale_path_until_ =
         position - std::exp(record.correction) * (position - T_odom_left_start_.translation());
+    extend_scale_path(position, filter_.path_sigma());
   }
-  extend_scale_path(position);
   publish_scale(&record, update.apply);
   return record;
 }
 
-/// The filter's `path_sigma` is made for steps that are summed as if their errors were independent.
-void MapSegment::extend_scale_path(const Vec3& position) {
+/// `sigma`: the filter's `path_sigma`, made for steps that are summed as if their errors were
+/// independent, of the scale that the camera came here with: its correction leaves the newest
+/// keyframe in its place.
+void MapSegment::extend_scale_path(const Vec3& position, double sigma) {
   const Vec3 step = position - scale_path_until_;
-  const double sigma = filter_.path_sigma();
   scale_path_until_ = position;
-  if (filter_.locked()) scale_path_covariance_ += sigma * sigma * step * step.transpose();
+  scale_path_covariance_ += sigma * sigma * step * step.transpose();
 }
 
 void MapSegment::publish_scale(const ScaleRecord* record, bool accepted) {

@@ -97,7 +97,7 @@ class MapSegment {
   void revise(const SE3& T_odom_left, KeyframeOutput* keyframe) const;
   void revise_left(const std::vector<KeyframeState>& left, std::vector<KeyframeOutput>* out);
   void publish_scale(const ScaleRecord* record, bool accepted);
-  void extend_scale_path(const Vec3& position);
+  void extend_scale_path(const Vec3& position, double sigma);
 
   const StereoOdometryConfig& config_;
   const FramePreparation& preparation_;

@@ -15,6 +15,9 @@ bool is_miss(ScaleVerdict verdict) {
 
 double square(double x) { return x * x; }
 
+/// Of a window's scale from one keyframe to the next: who differs by more measures something else.
+constexpr double kLargestDrift = 0.05;
+
 /// Growth of the variance of a sum of correlated errors over that of independent ones, for
 /// first-order correlation `c` (AR(1)).
 double correlation_growth(double c) { return (1.0 + c) / (1.0 - c); }
@@ -157,6 +160,7 @@ void ScaleFilter::disagree_with(const ScaleUpdate& update, double variance) {
                        square(config_.gate_sigmas) * (rejected_->variance + variance);
   const int agreeing = agrees ? agreeing_ + 1 : 1;
   disagree();
+  doubt_ = 0.5 * square(std::min(std::abs(update.innovation), kLargestDrift));
   agreeing_ = agreeing;
   rejected_ = Candidate{update.innovation, variance};
   if (agreeing_ >= config_.cold_start_after_agreeing) searching_ = true;
@@ -166,6 +170,7 @@ void ScaleFilter::agree_again() {
   disagreements_ = 0;
   agreeing_ = 0;
   out_of_view_ = 0;
+  doubt_ = 0.0;
   rejected_.reset();
 }
 
@@ -199,9 +204,9 @@ double ScaleFilter::walked(const ScaleMeasurement& m) const {
   return process_noise_ * std::max(m.distance, config_.min_distance);
 }
 
-double ScaleFilter::sigma() const { return std::sqrt(variance_); }
+double ScaleFilter::sigma() const { return std::sqrt(variance_ + doubt_); }
 
-double ScaleFilter::path_sigma() const { return std::sqrt(path_variance_); }
+double ScaleFilter::path_sigma() const { return std::sqrt(path_variance_ + doubt_); }
 
 double ScaleFilter::age_s(std::int64_t stamp_ns) const {
   return locked_ ? 1e-9 * static_cast<double>(stamp_ns - accepted_stamp_ns_) : 0.0;

@@ -93,7 +93,9 @@ class ScaleFilter {
   bool locked() const { return locked_; }
   /// Whether the next estimate should search the whole range.
   bool wants_cold_start() const { return !locked_ || searching_; }
-  /// Standard deviation of the log-scale error after the last correction.
+  /// Standard deviation of the log-scale error after the last correction. While a measurement
+  /// stands against it, either may be right: half of their squared difference is added, which
+  /// counts as 0.05 at most.
   double sigma() const;
   /// Standard deviation to take when keyframes' errors are summed as if independent: it makes up
   /// for their correlation.
@@ -136,6 +138,7 @@ class ScaleFilter {
   int out_of_view_ = 0;  ///< Keyframes in a row whose points lie outside the right image.
   int agreeing_ = 0;     ///< Of them, the newest that agree with each other.
   std::optional<Candidate> rejected_;
+  double doubt_ = 0.0;  ///< Variance that is added while a measurement disagrees.
   std::int64_t accepted_stamp_ns_ = 0;
   ScaleVerdict last_verdict_ = ScaleVerdict::kTooFewPoints;
   std::optional<Candidate> candidate_;

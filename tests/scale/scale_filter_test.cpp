@@ -118,6 +118,23 @@ TEST(ScaleFilter, AnOutlierIsGated) {
   EXPECT_EQ(filter.disagreements(), 0);
 }
 
+TEST(ScaleFilter, SigmaCountsThatADisagreeingMeasurementMayBeRight) {
+  ScaleFilter filter = locked_filter();
+  for (int i = 0; i < 20; ++i) filter.update(measure(0.0, 0.001));
+  const double sigma = filter.sigma();
+  const double path_sigma = filter.path_sigma();
+  filter.update(measure(0.04, 0.001));
+  EXPECT_NEAR(filter.sigma(), 0.04 / std::sqrt(2.0), 1e-3);
+  EXPECT_NEAR(filter.path_sigma(), 0.04 / std::sqrt(2.0), 1e-3);
+  filter.update(measure(0.0, 0.001, false, ScaleVerdict::kTooFewInliers));
+  EXPECT_GT(filter.sigma(), 0.02) << "nothing has been settled";
+  filter.update(measure(0.3, 0.001));
+  EXPECT_NEAR(filter.sigma(), 0.05 / std::sqrt(2.0), 1e-3) << "more does no window drift";
+  EXPECT_TRUE(filter.update(measure(0.0, 0.001)).apply);
+  EXPECT_LT(filter.sigma(), 2.0 * sigma);
+  EXPECT_LT(filter.path_sigma(), 2.0 * path_sigma);
+}
+
 TEST(ScaleFilter, SixDisagreementsAskForAColdStart) {
   ScaleFilter filter = locked_filter();
   for (int i = 0; i < 20; ++i) filter.update(measure(0.0, 0.001));

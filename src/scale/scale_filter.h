@@ -98,7 +98,7 @@ class ScaleFilter {
   /// counts as 0.05 at most.
   double sigma() const;
   /// Standard deviation to take when keyframes' errors are summed as if independent: it makes up
-  /// for their correlation.
+  /// for their correlation. A disagreeing measurement counts as in `sigma`.
   double path_sigma() const;
   /// Seconds from the last accepted measurement (or lock) to `stamp_ns`; 0 before the first.
   double age_s(std::int64_t stamp_ns) const;

@@ -30,8 +30,39 @@ struct Ranked {
 };
 constexpr double kExplainsNothing = 1e9;
 constexpr std::size_t kFavourites = 4;    ///< Motions looked at again for each that is kept.
+constexpr double kSamePixels = 0.5;       ///< Motions that end closer on a level are the same.
+constexpr std::size_t kMostAligned = 64;  ///< Of more, those are that explain most as they are.
 constexpr std::size_t kRankPoints = 500;  ///< Of a level: enough to compare motions, of thousands.
 constexpr std::size_t kMotionPoints = 256;  ///< At least: their mean motion decides on keyframes.
+
+/// A motion that moves the points out of view explains nothing.
+double badness(double rmse, int inliers, std::size_t points) {
+  const double share = static_cast<double>(inliers) / static_cast<double>(points);
+  return share > 0.0 ? rmse / std::sqrt(share) : kExplainsNothing;
+}
+
+void sort_best_first(std::vector<Ranked>* ranked) {
+  std::erase_if(*ranked, [](const Ranked& r) { return !(r.score < kExplainsNothing); });
+  std::stable_sort(ranked->begin(), ranked->end(),
+                   [](const Ranked& a, const Ranked& b) { return a.score < b.score; });
+}
+
+/// Those of `sorted` that are not what a better one is already: apart by more than `apart`, an
+/// angle and a share of the mean depth.
+std::vector<Ranked> distinct(const std::vector<Ranked>& sorted, double apart, double mean_rho,
+                             std::size_t most) {
+  std::vector<Ranked> out;
+  for (const Ranked& r : sorted) {
+    const bool known = std::any_of(out.begin(), out.end(), [&](const Ranked& better) {
+      const SE3 difference = r.T * better.T.inverse();
+      return difference.rotation().log().norm() < apart &&
+             difference.translation().norm() * mean_rho < apart;
+    });
+    if (!known) out.push_back(r);
+    if (out.size() == most) break;
+  }
+  return out;
+}
 
 /// Every n-th point, so that less than twice `most` are left.
 ReferenceLevel thinned(const ReferenceLevel& all, std::size_t most) {
@@ -285,8 +316,9 @@ TrackingResult CoarseTracker::track(const TrackingReference& reference, const Im
         try_hypothesis(reference, pyramid, exposure_s, affine_guess, hypotheses[i]);
     tried.hypothesis = static_cast<int>(i);
     if (tried.good && (!best.good || tried.rmse < best.rmse)) best = tried;
-    const bool enough = last_rmse > 0.0 && best.rmse < config_.lost_rmse_factor * last_rmse;
-    if (best.good && enough && best.inlier_ratio > config_.min_inlier_ratio) break;
+    best.as_expected = last_rmse > 0.0 && best.rmse < config_.lost_rmse_factor * last_rmse &&
+                       best.inlier_ratio > config_.sure_inlier_ratio;
+    if (best.good && best.as_expected) break;
   }
   if (!best.good) return best;
   best.correlation = correlation(reference.levels[0], pyramid.level(0), best.T_current_reference);
@@ -294,6 +326,26 @@ TrackingResult CoarseTracker::track(const TrackingReference& reference, const Im
               best.correlation > config_.min_correlation;
   best.motion = motion_of_points(reference, best.T_current_reference);
   return best;
+}
+
+double CoarseTracker::score_as_it_is(const TrackingReference& reference, int level,
+                                     const ImageF& image, double exposure_s, const Affine& affine,
+                                     const SE3& T) {
+  const ReferenceLevel& points = reference.levels[static_cast<std::size_t>(level)];
+  const BrightnessTransfer transfer =
+      brightness_transfer(reference.affine, reference.exposure_s, affine, exposure_s);
+  Linearization at;
+  const double energy = residuals(points, image, T, transfer, config_.cutoff, &at);
+  return badness(std::sqrt(energy), at.inliers, points.size());
+}
+
+double CoarseTracker::score_aligned(const TrackingReference& reference, int level,
+                                    const ImageF& image, double exposure_s, Affine affine, SE3* T) {
+  double cutoff = config_.cutoff;
+  const LevelOutcome o =
+      align_level(reference, level, image, exposure_s, &cutoff, T, &affine, kRankIterations);
+  if (!o.finite) return kExplainsNothing;
+  return badness(o.rmse, o.last.inliers, reference.levels[static_cast<std::size_t>(level)].size());
 }
 
 std::vector<SE3> CoarseTracker::rank(const TrackingReference& reference,
@@ -308,22 +360,21 @@ std::vector<SE3> CoarseTracker::rank(const TrackingReference& reference,
   for (int l = coarsest; l >= std::max(0, coarsest - 1); --l) {
     ReferenceLevel& level = few.levels[static_cast<std::size_t>(l)];
     level = thinned(level, kRankPoints);
-    for (Ranked& r : ranked) {
-      double cutoff = config_.cutoff;
-      Affine affine = affine_guess;
-      const LevelOutcome o = align_level(few, l, pyramid.level(l), exposure_s, &cutoff, &r.T,
-                                         &affine, kRankIterations);
-      const double inliers =
-          static_cast<double>(o.last.inliers) / static_cast<double>(level.size());
-      // A motion that moves the points out of view explains nothing.
-      r.score = o.finite && inliers > 0.0 ? o.rmse / std::sqrt(inliers) : kExplainsNothing;
+    const ImageF& image = pyramid.level(l);
+    if (ranked.size() > kMostAligned) {
+      for (Ranked& r : ranked) {
+        r.score = score_as_it_is(few, l, image, exposure_s, affine_guess, r.T);
+      }
+      sort_best_first(&ranked);
+      if (ranked.size() > kMostAligned) ranked.resize(kMostAligned);
     }
-    std::erase_if(ranked, [](const Ranked& r) { return r.score >= kExplainsNothing; });
-    std::stable_sort(ranked.begin(), ranked.end(),
-                     [](const Ranked& a, const Ranked& b) { return a.score < b.score; });
+    for (Ranked& r : ranked) {
+      r.score = score_aligned(few, l, image, exposure_s, affine_guess, &r.T);
+    }
     // The coarsest level is the cheapest judge; the next one decides among its favourites.
-    const std::size_t most = l == coarsest ? kFavourites * keep : keep;
-    if (ranked.size() > most) ranked.resize(most);
+    sort_best_first(&ranked);
+    ranked = distinct(ranked, kSamePixels / level.camera.fx, reference.mean_rho,
+                      l == coarsest ? kFavourites * keep : keep);
   }
   std::vector<SE3> out;
   for (const Ranked& r : ranked) out.push_back(r.T);

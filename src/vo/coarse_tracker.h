@@ -11,7 +11,6 @@
 
 namespace sovo {
 
-/// How a frame was tracked.
 /// How a motion moves the points of a reference in the image of level 0.
 struct PointMotion {
   double flow_translation = 0.0;  ///< RMS flow without the rotation [px].
@@ -22,8 +21,10 @@ struct PointMotion {
 /// That of `T_current_reference` (the flows as in DSO, Sec. 3.1, "keyframe creation").
 PointMotion motion_of_points(const TrackingReference& reference, const SE3& T_current_reference);
 
+/// How a frame was tracked.
 struct TrackingResult {
   bool good = false;
+  bool as_expected = false;  ///< It fits as well as the last frame lets expect.
   SE3 T_current_reference;
   Affine affine;              ///< Of the current frame.
   double rmse = 0.0;          ///< Of the finest level, saturated residuals at the cutoff.
@@ -49,8 +50,9 @@ class CoarseTracker {
                        double exposure_s, const Affine& affine_guess,
                        std::span<const SE3> hypotheses, double last_rmse);
 
-  /// For when nothing is known of the motion: aligns the coarsest level from each hypothesis, and
-  /// returns the `keep` best motions found, best first.
+  /// For when nothing is known of the motion: aligns the coarsest level from each hypothesis, or of
+  /// many from those that explain it best as they are, and returns the `keep` best motions found,
+  /// best first.
   std::vector<SE3> rank(const TrackingReference& reference, const ImagePyramid& pyramid,
                         double exposure_s, const Affine& affine_guess,
                         std::span<const SE3> hypotheses, std::size_t keep);
@@ -81,6 +83,11 @@ class CoarseTracker {
   LevelOutcome align_level(const TrackingReference& reference, int level, const ImageF& image,
                            double exposure_s, double* cutoff, SE3* T, Affine* affine,
                            int max_iterations);
+  /// How badly a motion explains a level, as it is or once aligned there; lower is better.
+  double score_as_it_is(const TrackingReference& reference, int level, const ImageF& image,
+                        double exposure_s, const Affine& affine, const SE3& T);
+  double score_aligned(const TrackingReference& reference, int level, const ImageF& image,
+                       double exposure_s, Affine affine, SE3* T);
   TrackingResult try_hypothesis(const TrackingReference& reference, const ImagePyramid& pyramid,
                                 double exposure_s, const Affine& guess, const SE3& start);
 

@@ -8,6 +8,9 @@ struct TrackerConfig {
   double cutoff = 20.0;  ///< Residuals above count a constant and leave the normal equations.
   int max_levels = 6;
   double lost_rmse_factor = 1.5;  ///< A hypothesis this much better than the last frame is taken.
+  /// And with more reference pixels in view that agree: right poses have 0.7 and more, also under
+  /// blur, wrong ones that fit by chance 0.6 and less.
+  double sure_inlier_ratio = 0.65;
   double max_rmse = 40.0;         ///< Lost above [grey levels].
   double min_inlier_ratio = 0.3;  ///< Lost below: reference pixels in view that agree.
   /// Lost below: correlation of reference and image. Right poses have 0.85 and more on real clips;
@@ -22,6 +25,7 @@ struct TrackerConfig {
     v("cutoff", cutoff, "residuals above count a constant [grey levels]");
     v("max_levels", max_levels, "pyramid levels at most");
     v("lost_rmse_factor", lost_rmse_factor, "a motion hypothesis is taken below this x last RMSE");
+    v("sure_inlier_ratio", sure_inlier_ratio, "and when this share of the pixels agrees");
     v("max_rmse", max_rmse, "tracking is lost above [grey levels]");
     v("min_inlier_ratio", min_inlier_ratio, "tracking is lost below");
     v("min_correlation", min_correlation, "tracking is lost below");

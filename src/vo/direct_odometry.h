@@ -77,6 +77,13 @@ struct MapResult {
 enum class MapStage { kTracing, kSelection, kStaticMatching, kBundleAdjustment, kMarginalization };
 using MapTimer = std::function<void(MapStage, double seconds)>;
 
+/// Where the camera was in the last frame, and where the new one should find it
+/// (T_camera_reference).
+struct KnownMotion {
+  SE3 expected;
+  SE3 last;
+};
+
 /// Direct sparse odometry of one camera: tracking of every frame, a sliding window of keyframes,
 /// points and a marginalization prior. Its lengths are in whatever unit the map began with;
 /// `apply` rescales it.
@@ -139,6 +146,7 @@ class DirectOdometry {
   TrackedFrame track_hypotheses(const MonoFrame& frame,
                                 std::shared_ptr<const TrackingReference> reference);
   void find_motion_hypotheses(const TrackingReference& reference, const MonoFrame& frame);
+  TrackingResult align(const TrackingReference& reference, const MonoFrame& frame);
 
   DirectConfig config_;
   CameraModel camera_;
@@ -174,6 +182,8 @@ class DirectOdometry {
     std::int64_t stamp_ns = 0;
   };
   std::vector<PastFrame> past_;  ///< The last two frames, newest last.
+  /// The motion since the reference when it is as it was between the past frames.
+  std::optional<KnownMotion> known_motion_;
   std::vector<SE3> hypotheses_;  ///< T_camera_reference of the new frame, the likeliest first.
   double expected_steps_ = 1.0;  ///< Time to the new frame over that between the past two.
   Affine last_affine_;

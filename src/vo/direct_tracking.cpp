@@ -8,17 +8,15 @@ namespace sovo {
 
 namespace {
 
-/// Rotations tried around the expected motion when nothing else fits [rad]: 2.3, 3.2 and 4.0
-/// degrees over one, two and three axes.
-constexpr std::array<double, 1> kRescueAngles = {0.04};
+/// Rotations tried beside translations when nothing is known [rad]: 2.3, 3.2 and 4.0 degrees over
+/// one, two and three axes.
+constexpr double kUnknownRotation = 0.04;
 
 void add_rotations(const SE3& around, std::vector<SE3>* hypotheses) {
-  for (const double angle : kRescueAngles) {
-    for (int i = 0; i < 27; ++i) {
-      const Vec3 axis(i % 3 - 1, (i / 3) % 3 - 1, i / 9 - 1);
-      if (axis.isZero()) continue;
-      hypotheses->push_back(SE3(SO3::exp(angle * axis), Vec3::Zero()) * around);
-    }
+  for (int i = 0; i < 27; ++i) {
+    const Vec3 axis(i % 3 - 1, (i / 3) % 3 - 1, i / 9 - 1);
+    if (axis.isZero()) continue;
+    hypotheses->push_back(SE3(SO3::exp(kUnknownRotation * axis), Vec3::Zero()) * around);
   }
 }
 
@@ -40,9 +38,50 @@ std::vector<SE3> unknown_motions(const SE3& around, double mean_rho) {
   return out;
 }
 
-constexpr std::size_t kUnknownMotionsKept = 4;
+constexpr std::size_t kMotionsKept = 4;
 
 SE3 scaled_motion(const SE3& motion, double factor) { return SE3::exp(factor * motion.log()); }
+
+/// Steps to either side of a grid, of which the outermost is at `reach`, or nearer when that takes
+/// more than `most`.
+int steps_to(double reach, double step, int most) {
+  return std::clamp(static_cast<int>(std::ceil(reach / step)), 1, most);
+}
+
+/// Turns by up to kReach around each axis, dense enough for alignment on `level` to begin from
+/// one of them: a pixel of it apart.
+std::vector<SO3> turns(const CameraModel& level) {
+  constexpr double kReach = 0.2;  // 11 degrees a frame
+  constexpr int kMostSteps = 8;
+  constexpr int kMostRolls = 2;
+  const double pixel = 1.0 / level.fx;
+  const double roll = 3.0 / (0.5 * (level.width + level.height));
+  const int n = steps_to(kReach, pixel, kMostSteps);
+  const int n_roll = steps_to(kReach, roll, kMostRolls);
+  std::vector<SO3> out;
+  for (int x = -n; x <= n; ++x) {
+    for (int y = -n; y <= n; ++y) {
+      for (int z = -n_roll; z <= n_roll; ++z) {
+        out.push_back(SO3::exp(Vec3(x * pixel, y * pixel, z * roll)));
+      }
+    }
+  }
+  return out;
+}
+
+/// Motions to try when none of the likely ones fits: a camera that was knocked turns by another
+/// angle than before, while its way goes on, or not.
+std::vector<SE3> knocked_motions(const KnownMotion& known, const CameraModel& level) {
+  const SE3 step = known.expected * known.last.inverse();
+  const SE3 straight_on(SO3(), step.rotation().inverse() * step.translation());
+  std::vector<SE3> out;
+  for (const SO3& turn : turns(level)) {
+    for (const SE3& motion : {known.expected, straight_on * known.last, known.last}) {
+      out.push_back(SE3(turn, Vec3::Zero()) * motion);
+    }
+  }
+  return out;
+}
 
 }  // namespace
 
@@ -65,18 +104,32 @@ void DirectOdometry::find_motion_hypotheses(const TrackingReference& reference,
       break;
     }
   }
+  known_motion_.reset();
   const SE3 last = known == 0 ? SE3() : from_reference[known - 1];
   if (known < 2) {
     hypotheses_ = tracker_.rank(reference, *frame.pyramid, frame.exposure_s, last_affine_,
-                                unknown_motions(last, reference.mean_rho), kUnknownMotionsKept);
+                                unknown_motions(last, reference.mean_rho), kMotionsKept);
     return;
   }
   // Constant velocity over the true time between the frames, which may have been dropped.
   const SE3 motion = last * from_reference[0].inverse();
   const SE3 expected = scaled_motion(motion, expected_steps_) * last;
+  known_motion_ = {expected, last};
   hypotheses_ = {expected, scaled_motion(motion, 2.0 * expected_steps_) * last,
                  scaled_motion(motion, 0.5 * expected_steps_) * last, last, SE3()};
-  add_rotations(expected, &hypotheses_);
+}
+
+TrackingResult DirectOdometry::align(const TrackingReference& reference, const MonoFrame& frame) {
+  TrackingResult likely = tracker_.track(reference, *frame.pyramid, frame.exposure_s, last_affine_,
+                                         hypotheses_, last_rmse_);
+  if (!known_motion_ || (likely.good && likely.as_expected)) return likely;
+  const std::vector<SE3> knocked =
+      tracker_.rank(reference, *frame.pyramid, frame.exposure_s, last_affine_,
+                    knocked_motions(*known_motion_, reference.levels.back().camera), kMotionsKept);
+  TrackingResult found = tracker_.track(reference, *frame.pyramid, frame.exposure_s, last_affine_,
+                                        knocked, last_rmse_);
+  const bool better = found.good && (!likely.good || found.rmse < likely.rmse);
+  return better ? found : likely;
 }
 
 TrackedFrame DirectOdometry::track(const MonoFrame& frame) {
@@ -91,6 +144,7 @@ TrackedFrame DirectOdometry::track(const MonoFrame& frame) {
 }
 
 TrackedFrame DirectOdometry::track_from(const MonoFrame& frame, const SE3& T_current_reference) {
+  known_motion_.reset();
   hypotheses_ = {T_current_reference};
   return track_hypotheses(frame, reference());
 }
@@ -102,8 +156,7 @@ TrackedFrame DirectOdometry::track_hypotheses(const MonoFrame& frame,
   out.reference = std::move(reference);
   const TrackingReference& ref = *out.reference;
   const bool same_reference = has_first_rmse_ && first_rmse_keyframe_ == ref.keyframe_id;
-  out.tracking =
-      tracker_.track(ref, *frame.pyramid, frame.exposure_s, last_affine_, hypotheses_, last_rmse_);
+  out.tracking = align(ref, frame);
   if (!out.tracking.good) return out;
 
   if (!same_reference) {

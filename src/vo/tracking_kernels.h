@@ -136,7 +136,11 @@ struct ResidualSums {
   std::size_t n = 0;  ///< Points written, whole groups.
 };
 
-/// Residuals, Huber energies and image gradients of all points.
+/// Grey level from which a pixel only says that there is at least so much light.
+inline constexpr float kWhite = 250.0F;
+
+/// Residuals, Huber energies and image gradients of all points. A white pixel of which more light
+/// is expected agrees, and says nothing about motion or brightness.
 struct ResidualPass {
   template <class F>
   struct Sums {
@@ -155,12 +159,14 @@ struct ResidualPass {
     const auto s = sample_lanes_with_gradient(points.image, p.offset, p.fx, p.fy);
     const F r = s.value - (config.gain * p.colour + config.bias);
     const F magnitude = abs_lane(r);
-    const MaskOf<F> inlier = p.in_view & (magnitude <= config.cutoff);
+    const MaskOf<F> white = p.in_view & (s.value >= kWhite) & (r <= 0.0F);
+    const MaskOf<F> inlier = p.in_view & ~white & (magnitude <= config.cutoff);
     const F hw = min_lane(lane_of<F>(1.0F), F(config.huber / magnitude));
     const F energy = inlier ? F(hw * r * r * (2.0F - hw)) : saturated;
-    sums->energy[part] += __builtin_convertvector(F(p.in_view ? energy : zero), DoublesOf<F>);
+    sums->energy[part] +=
+        __builtin_convertvector(F((p.in_view & ~white) ? energy : zero), DoublesOf<F>);
     sums->in_view -= p.in_view;
-    sums->inliers -= inlier;
+    sums->inliers -= inlier | white;
     store_lane(F(inlier ? p.x : zero), to.x + at);
     store_lane(F(inlier ? p.y : zero), to.y + at);
     store_lane(F(inlier ? p.rho : zero), to.rho + at);

@@ -34,6 +34,19 @@ def nothing_but_turning(t):
     return [0, 0, 0], turned(math.radians(40) * math.sin(math.pi * t / 3))
 
 
+def knocked(t):
+    """On a gentle curve, with a blow every 0.6 s that turns it by up to 15 degrees within 60 ms."""
+    def leaned(k):
+        if k < 1:
+            return 0.0, 0.0
+        return math.radians(9) * math.sin(2.4 * k), math.radians(7) * math.cos(1.7 * k)
+    blow = math.floor(t / 0.6)
+    share = eased(t - 0.6 * blow, 0, 0.06)
+    yaw, pitch = (a + share * (b - a) for a, b in zip(leaned(blow - 1), leaned(blow)))
+    return ([1.5 * math.sin(0.5 * t), 1.2 * math.sin(0.9 * t), 0.2 * math.sin(0.7 * t)],
+            turned(yaw + 0.2 * math.sin(0.6 * t), pitch))
+
+
 def rest_motion_rest(t):
     """From rest after half a second, to rest again after three."""
     return [1.5 * eased(t, 0.5, 3), 0.8 * eased(t, 0.5, 3), 0], turned(0)

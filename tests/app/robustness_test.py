@@ -4,8 +4,8 @@ import math
 import os
 
 import harness
-from flights import nothing_but_turning, rest_motion_rest, restless, turn_on_the_spot
-from flights import write_trajectory
+from flights import knocked, nothing_but_turning, rest_motion_rest, restless
+from flights import turn_on_the_spot, write_trajectory
 from harness import FAILED, OK, largest_error, read_tum, sovo
 from sim_test import SimTest
 
@@ -76,6 +76,11 @@ class Robustness(SimTest):
     def test_nothing_but_turning(self):
         flight = self.trajectory(nothing_but_turning, 4.0)
         self.expect_whole(*self.fly("hall", *flight), 0.02)
+
+    def test_blows_turn_it_by_many_degrees_from_one_frame_to_the_next(self):
+        flight = self.trajectory(knocked, 9.0)
+        for direction in ((), ("--reverse",)):
+            self.expect_whole(*self.fly("hall", *flight, *direction), 0.03)
 
     def test_rest_then_motion_then_rest(self):
         seconds = 63.0 if LONG else 8.0

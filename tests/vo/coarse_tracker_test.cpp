@@ -130,6 +130,34 @@ TEST(CoarseTracker, RecoversMotionGainAndBias) {
   }
 }
 
+// The sensor clips what is brighter; taken as it is, that pulls at gain and motion.
+TEST(CoarseTracker, WhitePixelsOfAnOverexposedImagePullAtNothing) {
+  const SyntheticScene scene(3);
+  const CameraModel camera = small_camera();
+  const TrackingReference reference = scene_reference(scene);
+  const SE3 truth(SO3::exp(Vec3(0.01, -0.02, 0.015)), Vec3(0.05, -0.03, 0.08));
+  ImageF image = scene_view(scene, camera, truth.inverse())->level(0);
+  constexpr double kGain = 1.9;
+  apply_brightness(kGain, 0.0, &image);
+  std::size_t white = 0;
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    white += image.data()[i] > 255.0F ? 1 : 0;
+    image.data()[i] = std::min(image.data()[i], 255.0F);
+  }
+  ASSERT_GT(static_cast<double>(white), 0.3 * static_cast<double>(image.size()));
+  CoarseTracker tracker{TrackerConfig()};
+  const std::vector<SE3> start = {SE3()};
+  const TrackingResult result =
+      tracker.track(reference, *pyramid_of(std::move(image)), 0.0, {}, start, 0.0);
+  ASSERT_TRUE(result.good);
+  const SE3 error = result.T_current_reference * truth.inverse();
+  EXPECT_LT(error.translation().norm(), 0.006);
+  EXPECT_LT(error.rotation().log().norm(), 0.002);
+  const BrightnessTransfer found = brightness_transfer({}, 0, result.affine, 0);
+  EXPECT_NEAR(found.gain * 80.0 + found.bias, kGain * 80.0, 5.0);
+  EXPECT_GT(result.inlier_ratio, 0.9);
+}
+
 TEST(CoarseTracker, TakesTheHypothesisThatFits) {
   const SyntheticScene scene(3);
   const TrackingReference reference = scene_reference(scene);
@@ -143,6 +171,53 @@ TEST(CoarseTracker, TakesTheHypothesisThatFits) {
   ASSERT_TRUE(result.good);
   EXPECT_EQ(result.hypothesis, 1);
   EXPECT_LT((result.T_current_reference * truth.inverse()).log().norm(), 0.006);
+}
+
+std::vector<SE3> turns_of(double step, int most) {
+  std::vector<SE3> out;
+  for (int x = -most; x <= most; ++x) {
+    for (int y = -most; y <= most; ++y) {
+      for (int z = -2; z <= 2; ++z) {
+        out.emplace_back(SO3::exp(step * Vec3(x, y, z)), Vec3::Zero());
+      }
+    }
+  }
+  return out;
+}
+
+TEST(CoarseTracker, RanksAKnockAmongManyTurns) {
+  const SyntheticScene scene(3);
+  const TrackingReference reference = scene_reference(scene);
+  const SE3 truth(SO3::exp(Vec3(0.13, -0.16, 0.06)), Vec3(0.05, -0.02, 0.04));
+  const ImagePyramidPtr image = scene_view(scene, small_camera(), truth.inverse());
+  CoarseTracker tracker{TrackerConfig()};
+  const std::vector<SE3> alone = {SE3()};
+  const TrackingResult lost = tracker.track(reference, *image, 0.0, {}, alone, 3.0);
+  ASSERT_FALSE(lost.good && lost.as_expected) << "this turn is found without help";
+  const std::vector<SE3> best = tracker.rank(reference, *image, 0.0, {}, turns_of(0.05, 4), 4);
+  ASSERT_GE(best.size(), 2U);
+  const TrackingResult found = tracker.track(reference, *image, 0.0, {}, best, 3.0);
+  ASSERT_TRUE(found.good);
+  EXPECT_LT((found.T_current_reference * truth.inverse()).log().norm(), 0.006);
+  for (std::size_t i = 1; i < best.size(); ++i) {
+    const Vec6 apart = (best[i] * best[0].inverse()).log();
+    EXPECT_GT(apart.norm(), 0.01) << "the same motion is offered twice";
+  }
+}
+
+// After a frame that fitted badly, a wrong pose may have residuals that are no worse.
+TEST(CoarseTracker, APoseThatHalfOfThePixelsDenyIsNotAsExpected) {
+  const SyntheticScene scene(3);
+  const TrackingReference reference = scene_reference(scene);
+  const ImagePyramidPtr other = scene_view(SyntheticScene(11), small_camera(), SE3());
+  const std::vector<SE3> start = {SE3()};
+  TrackerConfig config;
+  config.min_correlation = -1.0;
+  const TrackingResult wrong = CoarseTracker(config).track(reference, *other, 0.0, {}, start, 30.0);
+  ASSERT_TRUE(wrong.good) << "the test needs a pose that is taken";
+  EXPECT_FALSE(wrong.as_expected);
+  config.sure_inlier_ratio = 0.0;
+  EXPECT_TRUE(CoarseTracker(config).track(reference, *other, 0.0, {}, start, 30.0).as_expected);
 }
 
 // A small gain takes the reference's contrast away: residuals alone let such an image pass.

@@ -15,8 +15,8 @@ namespace sovo {
 
 namespace {
 
-/// Tracking with a residual this many times the usual one, or so few inliers, is DEGRADED.
-constexpr double kDegradedInliers = 0.5;
+/// With fewer inliers tracking is DEGRADED: of poses that are wrong most, of right ones hardly any.
+constexpr double kDegradedInliers = 0.65;
 constexpr double kNanosecond = 1e-9;
 
 }  // namespace

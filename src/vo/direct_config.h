@@ -8,14 +8,15 @@ struct TrackerConfig {
   double cutoff = 20.0;  ///< Residuals above count a constant and leave the normal equations.
   int max_levels = 6;
   double lost_rmse_factor = 1.5;  ///< A hypothesis this much better than the last frame is taken.
-  /// And with more reference pixels in view that agree: right poses have 0.7 and more, also under
-  /// blur, wrong ones that fit by chance 0.6 and less.
-  double sure_inlier_ratio = 0.65;
+  /// And when so many of the reference pixels in view agree: right poses hardly ever have less,
+  /// also under blur; wrong ones that fit by chance have up to 0.7.
+  double sure_inlier_ratio = 0.8;
   double max_rmse = 40.0;         ///< Lost above [grey levels].
-  double min_inlier_ratio = 0.3;  ///< Lost below: reference pixels in view that agree.
-  /// Lost below: correlation of reference and image. Right poses have 0.85 and more on real clips;
-  /// an unrelated image of little contrast may have small residuals, but no correlation.
-  double min_correlation = 0.4;
+  double min_inlier_ratio = 0.5;  ///< Lost below: reference pixels in view that agree.
+  /// Lost below: correlation of reference and image. Right poses have 0.6 and more, on real clips
+  /// as under blows and after gaps, those taken by chance mostly less; an unrelated image of little
+  /// contrast may have small residuals, but no correlation.
+  double min_correlation = 0.55;
   double brightness_prior_a = 100.0;  ///< Weight of a prior on the log-gain to the reference.
   double brightness_prior_b = 0.0;    ///< The same for the bias.
 

@@ -82,6 +82,7 @@ using MapTimer = std::function<void(MapStage, double seconds)>;
 struct KnownMotion {
   SE3 expected;
   SE3 last;
+  double steps = 1.0;  ///< Time since then over that between the two frames before.
 };
 
 /// Direct sparse odometry of one camera: tracking of every frame, a sliding window of keyframes,

@@ -48,16 +48,15 @@ int steps_to(double reach, double step, int most) {
   return std::clamp(static_cast<int>(std::ceil(reach / step)), 1, most);
 }
 
-/// Turns by up to kReach around each axis, dense enough for alignment on `level` to begin from
-/// one of them: a pixel of it apart.
-std::vector<SO3> turns(const CameraModel& level) {
-  constexpr double kReach = 0.2;  // 11 degrees a frame
+/// Turns by up to `reach` around each axis [rad], dense enough for alignment on `level` to begin
+/// from one of them: a pixel of it apart.
+std::vector<SO3> turns(double reach, const CameraModel& level) {
   constexpr int kMostSteps = 8;
   constexpr int kMostRolls = 2;
   const double pixel = 1.0 / level.fx;
   const double roll = 3.0 / (0.5 * (level.width + level.height));
-  const int n = steps_to(kReach, pixel, kMostSteps);
-  const int n_roll = steps_to(kReach, roll, kMostRolls);
+  const int n = steps_to(reach, pixel, kMostSteps);
+  const int n_roll = steps_to(reach, roll, kMostRolls);
   std::vector<SO3> out;
   for (int x = -n; x <= n; ++x) {
     for (int y = -n; y <= n; ++y) {
@@ -70,15 +69,20 @@ std::vector<SO3> turns(const CameraModel& level) {
 }
 
 /// Motions to try when none of the likely ones fits: a camera that was knocked turns by another
-/// angle than before, while its way goes on, or not.
+/// angle than before, while its way goes on, or not. After a gap it may have gone any part of it.
 std::vector<SE3> knocked_motions(const KnownMotion& known, const CameraModel& level) {
+  constexpr double kReach = 0.2;  // 11 degrees from one frame to the next
   const SE3 step = known.expected * known.last.inverse();
   const SE3 straight_on(SO3(), step.rotation().inverse() * step.translation());
-  std::vector<SE3> out;
-  for (const SO3& turn : turns(level)) {
-    for (const SE3& motion : {known.expected, straight_on * known.last, known.last}) {
-      out.push_back(SE3(turn, Vec3::Zero()) * motion);
+  std::vector<SE3> around = {known.expected, straight_on * known.last, known.last};
+  if (known.steps > 1.5) {
+    for (const double part : {0.25, 0.5, 0.75, 1.25}) {
+      around.push_back(scaled_motion(step, part) * known.last);
     }
+  }
+  std::vector<SE3> out;
+  for (const SO3& turn : turns(std::min(known.steps, 2.0) * kReach, level)) {
+    for (const SE3& motion : around) out.push_back(SE3(turn, Vec3::Zero()) * motion);
   }
   return out;
 }
@@ -114,7 +118,7 @@ void DirectOdometry::find_motion_hypotheses(const TrackingReference& reference,
   // Constant velocity over the true time between the frames, which may have been dropped.
   const SE3 motion = last * from_reference[0].inverse();
   const SE3 expected = scaled_motion(motion, expected_steps_) * last;
-  known_motion_ = {expected, last};
+  known_motion_ = {expected, last, expected_steps_};
   hypotheses_ = {expected, scaled_motion(motion, 2.0 * expected_steps_) * last,
                  scaled_motion(motion, 0.5 * expected_steps_) * last, last, SE3()};
 }

@@ -82,6 +82,12 @@ class Robustness(SimTest):
         for direction in ((), ("--reverse",)):
             self.expect_whole(*self.fly("hall", *flight, *direction), 0.03)
 
+    def test_half_a_second_without_pairs_every_three(self):
+        for direction in ((), ("--reverse",)):
+            truth, live = self.fly("hall", "--frames", 160, *direction, gap_s=0.5, gap_every_s=3)
+            self.assertLess(len(truth), 145)
+            self.expect_whole(truth, live, 0.05)
+
     def test_rest_then_motion_then_rest(self):
         seconds = 63.0 if LONG else 8.0
         flight = self.trajectory(rest_motion_rest, seconds)

@@ -212,6 +212,22 @@ TEST(SimSourceTest, DarkCameraAndDroppedPairs) {
   EXPECT_TRUE(gap);
 }
 
+TEST(SimSourceTest, PairsAreLostForAWhileAgainAndAgain) {
+  SimConfig config = quiet(World::kLawn);
+  config.frames = 14;
+  config.frame_rate = 10.0;
+  config.sensor.gap_s = 0.2;
+  config.sensor.gap_every_s = 0.5;
+  SimSource source = make_source(config, small_rig(Distortion::kNone));
+  std::vector<std::uint64_t> seen;
+  for (std::size_t i = 0; i < *source.size(); ++i) seen.push_back(first_frame(source).sequence);
+  const std::uint64_t zero = seen.front();
+  for (std::uint64_t& s : seen) s -= zero;
+  EXPECT_EQ(seen, (std::vector<std::uint64_t>{0, 1, 2, 3, 4, 7, 8, 9, 12, 13}));
+  config.sensor.gap_every_s = 0.1;
+  EXPECT_NE(open_sim(config).error().find("gap_every_s"), std::string::npos);
+}
+
 TEST(SimSourceTest, BackwardsIsTheMirrorInTime) {
   SimConfig config = quiet(World::kHall);
   SimSource forward = make_source(config, small_rig(Distortion::kNone));

@@ -67,6 +67,8 @@ struct SensorConfig {
   double light_from_s = 0.0;
   double light_until_s = 1e9;
   double drop_rate = 0.0;
+  double gap_s = 0.0;        ///< All pairs of this time are lost,
+  double gap_every_s = 4.0;  ///< this often.
   Side dark = Side::kNone;
   double dark_from_s = 0.0;
   double dark_until_s = 1e9;
@@ -93,6 +95,8 @@ struct SensorConfig {
     v("light_from_s", light_from_s, "time from which on it is changed [s]");
     v("light_until_s", light_until_s, "time until which it is changed [s]");
     v("drop_rate", drop_rate, "share of pairs that are lost");
+    v("gap_s", gap_s, "time during which all pairs are lost, again and again; 0: never [s]");
+    v("gap_every_s", gap_every_s, "time from the beginning of one gap to that of the next [s]");
     v("dark", dark, "camera that goes dark");
     v("dark_from_s", dark_from_s, "time from which on it is dark [s]");
     v("dark_until_s", dark_until_s, "time until which it is dark [s]");

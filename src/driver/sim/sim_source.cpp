@@ -18,6 +18,13 @@ std::int64_t utc_now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
 }
 
+/// Whether `t` seconds after the first pair lie in one of the regular gaps, or on its first edge.
+bool in_gap(const SensorConfig& sensor, double t) {
+  constexpr double kEdge = 1e-6;
+  if (!(sensor.gap_s > 0.0) || t + kEdge < sensor.gap_every_s) return false;
+  return std::fmod(t + kEdge, sensor.gap_every_s) < sensor.gap_s;
+}
+
 /// Pairs of the trajectory that the configuration asks for and that are not dropped.
 std::vector<std::size_t> choose_pairs(const SimConfig& config, const Motion& motion, double rate) {
   const auto start = static_cast<std::size_t>(config.start);
@@ -28,7 +35,8 @@ std::vector<std::size_t> choose_pairs(const SimConfig& config, const Motion& mot
   for (std::size_t i = start; i < start + count; ++i) {
     // The first pair is never dropped.
     const bool dropped = i > start && unit(combine(config.seed + 77, i)) < config.sensor.drop_rate;
-    if (!dropped) pairs.push_back(i);
+    const double t = static_cast<double>(i - start) / rate;
+    if (!dropped && !in_gap(config.sensor, t)) pairs.push_back(i);
   }
   return pairs;
 }
@@ -72,6 +80,9 @@ Result<void> check(const SimConfig& config) {
   }
   if (s.drop_rate < 0.0 || s.drop_rate > 0.95)
     return Error{"sensor.drop_rate must be in [0, 0.95]"};
+  if (!(s.gap_s >= 0.0 && (s.gap_s == 0.0 || s.gap_s < s.gap_every_s))) {
+    return Error{"sensor.gap_s must be below sensor.gap_every_s"};
+  }
   if (!(s.max_exposure_ms > 0.0)) return Error{"sensor.max_exposure_ms must be positive"};
   if (s.read_noise < 0.0 || s.shot_noise < 0.0) return Error{"noise must not be negative"};
   return {};

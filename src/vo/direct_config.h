@@ -98,7 +98,7 @@ struct WindowConfig {
   double huber = 9.0;
   double outlier_threshold = 144.0;  ///< A pixel: start value of the adaptive outlier threshold.
   double gradient_constant = 50.0;   ///< c of the weight c^2 / (c^2 + |grad I|^2).
-  double folding_weight = 0.25;  ///< Of marginalized points' Hessians: pattern pixels correlate.
+  double folding_weight = 0.5;  ///< Of marginalized points' Hessians: pattern pixels correlate.
   double damping = 1e-5;
   double depth_damping = 100.0;            ///< Added to H_rho * mean_rho^2 of every point.
   double min_parallax = 2.0;               ///< Below it stereo depths stand against steps [px].

@@ -81,7 +81,7 @@ std::vector<SE3> knocked_motions(const KnownMotion& known, const CameraModel& le
     }
   }
   std::vector<SE3> out;
-  for (const SO3& turn : turns(std::min(known.steps, 2.0) * kReach, level)) {
+  for (const SO3& turn : turns(std::clamp(known.steps, 1.0, 2.0) * kReach, level)) {
     for (const SE3& motion : around) out.push_back(SE3(turn, Vec3::Zero()) * motion);
   }
   return out;

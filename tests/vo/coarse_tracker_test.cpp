@@ -253,6 +253,8 @@ TEST(CoarseTracker, UnrelatedOrEmptyImageIsLost) {
     noise.data()[i] = static_cast<float>(uniform(random) < 0.5 ? 0.0 : 255.0);
   }
   EXPECT_FALSE(tracker.track(reference, *pyramid_of(noise), 0.0, {}, start, 3.0).good);
+  noise.fill(255.0F);
+  EXPECT_FALSE(tracker.track(reference, *pyramid_of(noise), 0.0, {}, start, 3.0).good) << "white";
   noise.fill(std::numeric_limits<float>::quiet_NaN());
   EXPECT_FALSE(tracker.track(reference, *pyramid_of(noise), 0.0, {}, start, 3.0).good);
   const std::vector<SE3> away = {SE3(SO3::exp(Vec3(0, M_PI, 0)), Vec3::Zero())};

@@ -147,6 +147,8 @@ class DirectOdometry {
   TrackedFrame track_hypotheses(const MonoFrame& frame,
                                 std::shared_ptr<const TrackingReference> reference);
   void find_motion_hypotheses(const TrackingReference& reference, const MonoFrame& frame);
+  /// From the likely motions, and when none fits as expected, from those of a camera that was
+  /// knocked.
   TrackingResult align(const TrackingReference& reference, const MonoFrame& frame);
 
   DirectConfig config_;

@@ -111,6 +111,15 @@ Vec8 damped_step(Mat8 H, const Vec8& gradient, const Vec8& prior, const Vec8& un
   return step;
 }
 
+/// A scene that hides much of itself has fewer inliers from frame to frame, always; a wrong pose
+/// has fewer than the frame before.
+double expected_inlier_ratio(const TrackerConfig& config, const LastTracking& last) {
+  constexpr double kSteady = 0.1;
+  constexpr double kLeast = 0.65;
+  const double steady = std::max(last.inlier_ratio - kSteady, kLeast);
+  return std::min(steady, config.sure_inlier_ratio);
+}
+
 /// Sums of pairs of values.
 struct Moments {
   double n = 0.0, x = 0.0, y = 0.0, xx = 0.0, yy = 0.0, xy = 0.0;
@@ -308,7 +317,7 @@ TrackingResult CoarseTracker::try_hypothesis(const TrackingReference& reference,
 
 TrackingResult CoarseTracker::track(const TrackingReference& reference, const ImagePyramid& pyramid,
                                     double exposure_s, const Affine& affine_guess,
-                                    std::span<const SE3> hypotheses, double last_rmse) {
+                                    std::span<const SE3> hypotheses, const LastTracking& last) {
   best_rmse_.assign(reference.levels.size(), 1e10);
   TrackingResult best;
   for (std::size_t i = 0; i < hypotheses.size(); ++i) {
@@ -316,8 +325,8 @@ TrackingResult CoarseTracker::track(const TrackingReference& reference, const Im
         try_hypothesis(reference, pyramid, exposure_s, affine_guess, hypotheses[i]);
     tried.hypothesis = static_cast<int>(i);
     if (tried.good && (!best.good || tried.rmse < best.rmse)) best = tried;
-    best.as_expected = last_rmse > 0.0 && best.rmse < config_.lost_rmse_factor * last_rmse &&
-                       best.inlier_ratio > config_.sure_inlier_ratio;
+    best.as_expected = last.rmse > 0.0 && best.rmse < config_.lost_rmse_factor * last.rmse &&
+                       best.inlier_ratio > expected_inlier_ratio(config_, last);
     if (best.good && best.as_expected) break;
   }
   if (!best.good) return best;

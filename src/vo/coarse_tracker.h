@@ -37,6 +37,12 @@ struct TrackingResult {
   int hypothesis = 0;               ///< Which motion hypothesis was taken.
 };
 
+/// How well the last frame was tracked.
+struct LastTracking {
+  double rmse = 0.0;  ///< 0: nothing is known of it.
+  double inlier_ratio = 1.0;
+};
+
 /// Direct image alignment of a frame with the tracking reference: pose (6) and affine brightness
 /// (2), Levenberg-Marquardt from the coarsest level to the finest (DSO, Sec. 3.1, "frame
 /// tracking").
@@ -44,11 +50,11 @@ class CoarseTracker {
  public:
   explicit CoarseTracker(const TrackerConfig& config) : config_(config) {}
 
-  /// Tracks from the first hypothesis on until one is as good as `last_rmse` lets expect; the best
-  /// one counts. `last_rmse` <= 0: nothing is known of it, all are tried.
+  /// Tracks from the first hypothesis on until one is as good as `last` lets expect; the best one
+  /// counts. When nothing is known of the last frame, all are tried.
   TrackingResult track(const TrackingReference& reference, const ImagePyramid& pyramid,
                        double exposure_s, const Affine& affine_guess,
-                       std::span<const SE3> hypotheses, double last_rmse);
+                       std::span<const SE3> hypotheses, const LastTracking& last);
 
   /// For when nothing is known of the motion: aligns the coarsest level from each hypothesis, or of
   /// many from those that explain it best as they are, and returns the `keep` best motions found,

@@ -8,8 +8,8 @@ struct TrackerConfig {
   double cutoff = 20.0;  ///< Residuals above count a constant and leave the normal equations.
   int max_levels = 6;
   double lost_rmse_factor = 1.5;  ///< A hypothesis below this times the last RMSE is taken,
-  /// when more of the reference pixels in view agree, too. Right poses hardly ever have less, also
-  /// under blur; wrong ones that fit by chance have up to 0.7.
+  /// when more of the reference pixels in view agree, too, or hardly fewer than in the last frame.
+  /// Right poses seldom have less, also under blur; wrong ones that fit by chance have up to 0.7.
   double sure_inlier_ratio = 0.8;
   double max_rmse = 40.0;         ///< Lost above [grey levels].
   double min_inlier_ratio = 0.5;  ///< Lost below: reference pixels in view that agree.
@@ -26,7 +26,8 @@ struct TrackerConfig {
     v("cutoff", cutoff, "residuals above count a constant [grey levels]");
     v("max_levels", max_levels, "pyramid levels at most");
     v("lost_rmse_factor", lost_rmse_factor, "a motion hypothesis is taken below this x last RMSE");
-    v("sure_inlier_ratio", sure_inlier_ratio, "and above this share of pixels in view that agree");
+    v("sure_inlier_ratio", sure_inlier_ratio,
+      "and above this share of pixels in view that agree, or little below the last");
     v("max_rmse", max_rmse, "tracking is lost above [grey levels]");
     v("min_inlier_ratio", min_inlier_ratio, "tracking is lost below");
     v("min_correlation", min_correlation, "tracking is lost below");

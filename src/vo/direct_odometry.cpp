@@ -129,7 +129,7 @@ void DirectOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
   past_.clear();
   has_first_rmse_ = false;
   last_affine_ = {};
-  last_rmse_ = 0.0;
+  last_tracking_ = {};
   next_id_ = 0;
   Keyframe& k =
       window_.insert(new_keyframe(next_id_++, frame, T_world_camera, Affine(), config_.window));

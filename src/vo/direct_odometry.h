@@ -190,7 +190,7 @@ class DirectOdometry {
   std::vector<SE3> hypotheses_;  ///< T_camera_reference of the new frame, the likeliest first.
   double expected_steps_ = 1.0;  ///< Time to the new frame over that between the past two.
   Affine last_affine_;
-  double last_rmse_ = 0.0;
+  LastTracking last_tracking_;
   double first_rmse_ = 0.0;
   std::uint32_t first_rmse_keyframe_ = 0;
   bool has_first_rmse_ = false;

@@ -126,13 +126,13 @@ void DirectOdometry::find_motion_hypotheses(const TrackingReference& reference,
 
 TrackingResult DirectOdometry::align(const TrackingReference& reference, const MonoFrame& frame) {
   TrackingResult likely = tracker_.track(reference, *frame.pyramid, frame.exposure_s, last_affine_,
-                                         hypotheses_, last_rmse_);
+                                         hypotheses_, last_tracking_);
   if (!known_motion_ || (likely.good && likely.as_expected)) return likely;
   const std::vector<SE3> knocked =
       tracker_.rank(reference, *frame.pyramid, frame.exposure_s, last_affine_,
                     knocked_motions(*known_motion_, reference.levels.back().camera), kMotionsKept);
   TrackingResult found = tracker_.track(reference, *frame.pyramid, frame.exposure_s, last_affine_,
-                                        knocked, last_rmse_);
+                                        knocked, last_tracking_);
   const bool better = found.good && (!likely.good || found.rmse < likely.rmse);
   return better ? found : likely;
 }
@@ -169,7 +169,7 @@ TrackedFrame DirectOdometry::track_hypotheses(const MonoFrame& frame,
     first_rmse_keyframe_ = ref.keyframe_id;
     has_first_rmse_ = true;
   }
-  last_rmse_ = out.tracking.rmse;
+  last_tracking_ = {out.tracking.rmse, out.tracking.inlier_ratio};
   last_affine_ = out.tracking.affine;
   out.T_world_camera = ref.T_world_camera * out.tracking.T_current_reference.inverse();
   out.wants_keyframe =

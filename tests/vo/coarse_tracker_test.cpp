@@ -115,7 +115,7 @@ TEST(CoarseTracker, RecoversMotionGainAndBias) {
     CoarseTracker tracker{TrackerConfig()};
     const std::vector<SE3> start = {SE3()};
     const TrackingResult result =
-        tracker.track(reference, *pyramid_of(std::move(image)), 0.0, reference_affine, start, 0.0);
+        tracker.track(reference, *pyramid_of(std::move(image)), 0.0, reference_affine, start, {});
     ASSERT_TRUE(result.good);
     const SE3 error = result.T_current_reference * truth.inverse();
     EXPECT_LT(error.translation().norm(), 0.003);
@@ -148,7 +148,7 @@ TEST(CoarseTracker, WhitePixelsOfAnOverexposedImagePullAtNothing) {
   CoarseTracker tracker{TrackerConfig()};
   const std::vector<SE3> start = {SE3()};
   const TrackingResult result =
-      tracker.track(reference, *pyramid_of(std::move(image)), 0.0, {}, start, 0.0);
+      tracker.track(reference, *pyramid_of(std::move(image)), 0.0, {}, start, {});
   ASSERT_TRUE(result.good);
   const SE3 error = result.T_current_reference * truth.inverse();
   EXPECT_LT(error.translation().norm(), 0.006);
@@ -167,7 +167,7 @@ TEST(CoarseTracker, TakesTheHypothesisThatFits) {
   const std::vector<SE3> hypotheses = {SE3(SO3::exp(Vec3(0, -0.25, 0)), Vec3::Zero()),
                                        SE3(SO3::exp(Vec3(0, 0.15, 0)), Vec3::Zero()),
                                        SE3(SO3::exp(Vec3(0, 0, 0.6)), Vec3::Zero())};
-  const TrackingResult result = tracker.track(reference, *image, 0.0, {}, hypotheses, 0.0);
+  const TrackingResult result = tracker.track(reference, *image, 0.0, {}, hypotheses, {});
   ASSERT_TRUE(result.good);
   EXPECT_EQ(result.hypothesis, 1);
   EXPECT_LT((result.T_current_reference * truth.inverse()).log().norm(), 0.006);
@@ -192,11 +192,11 @@ TEST(CoarseTracker, RanksAKnockAmongManyTurns) {
   const ImagePyramidPtr image = scene_view(scene, small_camera(), truth.inverse());
   CoarseTracker tracker{TrackerConfig()};
   const std::vector<SE3> alone = {SE3()};
-  const TrackingResult lost = tracker.track(reference, *image, 0.0, {}, alone, 3.0);
+  const TrackingResult lost = tracker.track(reference, *image, 0.0, {}, alone, {3.0, 1.0});
   ASSERT_FALSE(lost.good && lost.as_expected) << "this turn is found without help";
   const std::vector<SE3> best = tracker.rank(reference, *image, 0.0, {}, turns_of(0.05, 4), 4);
   ASSERT_GE(best.size(), 2U);
-  const TrackingResult found = tracker.track(reference, *image, 0.0, {}, best, 3.0);
+  const TrackingResult found = tracker.track(reference, *image, 0.0, {}, best, {3.0, 1.0});
   ASSERT_TRUE(found.good);
   EXPECT_LT((found.T_current_reference * truth.inverse()).log().norm(), 0.006);
   for (std::size_t i = 1; i < best.size(); ++i) {
@@ -213,11 +213,34 @@ TEST(CoarseTracker, APoseThatHalfOfThePixelsDenyIsNotAsExpected) {
   const std::vector<SE3> start = {SE3()};
   TrackerConfig config;
   config.min_correlation = -1.0;
-  const TrackingResult wrong = CoarseTracker(config).track(reference, *other, 0.0, {}, start, 30.0);
+  const auto track = [&](const LastTracking& last) {
+    return CoarseTracker(config).track(reference, *other, 0.0, {}, start, last);
+  };
+  const TrackingResult wrong = track({30.0, 1.0});
   ASSERT_TRUE(wrong.good) << "the test needs a pose that is taken";
   EXPECT_FALSE(wrong.as_expected);
   config.sure_inlier_ratio = 0.0;
-  EXPECT_TRUE(CoarseTracker(config).track(reference, *other, 0.0, {}, start, 30.0).as_expected);
+  EXPECT_TRUE(track({30.0, 1.0}).as_expected);
+}
+
+// Where a scene hides much of itself in every frame, a wider search each time is for nothing.
+TEST(CoarseTracker, AsManyInliersAsInTheLastFrameAreAsExpected) {
+  const SyntheticScene scene(3);
+  const TrackingReference reference = scene_reference(scene);
+  ImageF covered = scene_view(scene, small_camera(), SE3())->level(0);
+  for (int y = 0; y < covered.height(); ++y) {
+    for (int x = 0; x < covered.width() / 4; ++x) covered.at(x, y) = 200.0F;
+  }
+  const ImagePyramidPtr image = pyramid_of(std::move(covered));
+  const std::vector<SE3> start = {SE3()};
+  const auto track = [&](const LastTracking& last) {
+    return CoarseTracker(TrackerConfig()).track(reference, *image, 0.0, {}, start, last);
+  };
+  const TrackingResult first = track({30.0, 0.95});
+  ASSERT_TRUE(first.good);
+  ASSERT_LT(first.inlier_ratio, TrackerConfig().sure_inlier_ratio);
+  EXPECT_FALSE(first.as_expected);
+  EXPECT_TRUE(track({30.0, first.inlier_ratio}).as_expected);
 }
 
 // A small gain takes the reference's contrast away: residuals alone let such an image pass.
@@ -228,15 +251,15 @@ TEST(CoarseTracker, UnrelatedSceneOfSmallResidualsIsLost) {
   const std::vector<SE3> start = {SE3()};
   const ImagePyramidPtr other = scene_view(SyntheticScene(11), camera, SE3());
   TrackerConfig config;
-  EXPECT_FALSE(CoarseTracker(config).track(reference, *other, 0.0, {}, start, 3.0).good);
+  EXPECT_FALSE(CoarseTracker(config).track(reference, *other, 0.0, {}, start, {3.0, 1.0}).good);
   config.min_correlation = -1.0;
-  EXPECT_TRUE(CoarseTracker(config).track(reference, *other, 0.0, {}, start, 3.0).good)
+  EXPECT_TRUE(CoarseTracker(config).track(reference, *other, 0.0, {}, start, {3.0, 1.0}).good)
       << "residuals alone tell this one; the test needs another";
   config = {};
   ImageF faint = (*scene_view(scene, camera, SE3()))[0];
   for (std::size_t i = 0; i < faint.size(); ++i) faint.data()[i] = 60.0F + 0.4F * faint.data()[i];
   const TrackingResult seen =
-      CoarseTracker(config).track(reference, *pyramid_of(faint), 0.0, {}, start, 3.0);
+      CoarseTracker(config).track(reference, *pyramid_of(faint), 0.0, {}, start, {3.0, 1.0});
   EXPECT_TRUE(seen.good);
   EXPECT_GT(seen.correlation, 0.95);
 }
@@ -252,14 +275,16 @@ TEST(CoarseTracker, UnrelatedOrEmptyImageIsLost) {
   for (std::size_t i = 0; i < noise.size(); ++i) {
     noise.data()[i] = static_cast<float>(uniform(random) < 0.5 ? 0.0 : 255.0);
   }
-  EXPECT_FALSE(tracker.track(reference, *pyramid_of(noise), 0.0, {}, start, 3.0).good);
+  EXPECT_FALSE(tracker.track(reference, *pyramid_of(noise), 0.0, {}, start, {3.0, 1.0}).good);
   noise.fill(255.0F);
-  EXPECT_FALSE(tracker.track(reference, *pyramid_of(noise), 0.0, {}, start, 3.0).good) << "white";
+  EXPECT_FALSE(tracker.track(reference, *pyramid_of(noise), 0.0, {}, start, {3.0, 1.0}).good)
+      << "white";
   noise.fill(std::numeric_limits<float>::quiet_NaN());
-  EXPECT_FALSE(tracker.track(reference, *pyramid_of(noise), 0.0, {}, start, 3.0).good);
+  EXPECT_FALSE(tracker.track(reference, *pyramid_of(noise), 0.0, {}, start, {3.0, 1.0}).good);
   const std::vector<SE3> away = {SE3(SO3::exp(Vec3(0, M_PI, 0)), Vec3::Zero())};
   const ImagePyramidPtr same = scene_view(scene, camera, SE3());
-  EXPECT_FALSE(tracker.track(reference, *same, 0.0, {}, away, 3.0).good) << "nothing is in view";
+  EXPECT_FALSE(tracker.track(reference, *same, 0.0, {}, away, {3.0, 1.0}).good)
+      << "nothing is in view";
 }
 
 TEST(TrackingReference, HoldsDepthsAtEveryLevelAndScales) {

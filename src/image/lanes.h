@@ -224,9 +224,7 @@ SOVO_LANE_FUNCTION Lane sqrt_lane(const Lane& v) {
 #endif
 }
 SOVO_LANE_FUNCTION WideLane sqrt_lane(const WideLane& v) {
-  WideLane root;
-  for (std::size_t i = 0; i < kWideLanes; ++i) root[i] = __builtin_sqrtf(v[i]);
-  return root;
+  return join(sqrt_lane(low_half(v)), sqrt_lane(high_half(v)));
 }
 
 /// Sum in a fixed order.

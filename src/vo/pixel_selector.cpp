@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "sovo/image/lanes.h"
 
 namespace sovo {
 namespace {
 
-constexpr int kMaxMedian = 48;  // the histogram's cap [grey levels / px]
 constexpr int kNumDirections = 16;
 constexpr int kMaxBlock = 64;
 
@@ -34,21 +34,32 @@ float squared_gradient(const ImageF& image, int x, int y) {
   return gx * gx + gy * gy;
 }
 
-/// Median of |grad I| over every second pixel of every second row of [x0, x1) x [y0, y1).
-float median_gradient(const ImageF& image, int x0, int x1, int y0, int y1) {
-  std::array<int, kMaxMedian + 1> histogram{};
-  int count = 0;
-  for (int y = y0; y < y1; y += 2) {
-    for (int x = x0; x < x1; x += 2) {
-      const float g2 =
-          std::min(squared_gradient(image, x, y), static_cast<float>(kMaxMedian * kMaxMedian));
-      ++histogram[static_cast<std::size_t>(std::sqrt(g2))];
-      ++count;
-    }
+/// |grad I| of pixels of a row in whole grey levels a pixel, at most kMostGradient. Eight pixels at
+/// least.
+struct GradientSteps {
+  template <class F>
+  SOVO_LANE_FUNCTION static void steps(const float* row, std::ptrdiff_t width, int x,
+                                       std::int32_t* out) {
+    constexpr float kMost = static_cast<float>(kMostGradient);
+    const F gx = 0.5F * (load_lane<F>(row + x + 1) - load_lane<F>(row + x - 1));
+    const F gy = 0.5F * (load_lane<F>(row + x + width) - load_lane<F>(row + x - width));
+    const F squared = min_lane(F(gx * gx + gy * gy), F(F{} + kMost * kMost));
+    store_mask(to_int(sqrt_lane(squared)), out + x);
   }
+  template <class F>
+  SOVO_LANE_FUNCTION static void run(const float* row, std::ptrdiff_t width, int first, int last,
+                                     std::int32_t* out) {
+    constexpr int n = static_cast<int>(lanes_of<F>);
+    for (int x = first; x + n <= last; x += n) steps<F>(row, width, x, out);
+    steps<F>(row, width, last - n, out);
+  }
+};
+
+float median_of(const GradientHistogram& histogram) {
+  const int count = std::accumulate(histogram.begin(), histogram.end(), 0);
   int below = 0;
-  for (int g = 0; g <= kMaxMedian; ++g) {
-    below += histogram[static_cast<std::size_t>(g)];
+  for (std::size_t g = 0; g < histogram.size(); ++g) {
+    below += histogram[g];
     if (2 * below >= count) return static_cast<float>(g);
   }
   return 0.0F;
@@ -115,8 +126,9 @@ void PixelSelector::select(const ImagePyramid& pyramid, const ImageU8* mask, int
                            std::vector<SelectedPixel>* out) {
   out->clear();
   const ImageF& image = pyramid[0];
-  const int least = 2 * std::max(1, config_.border) + 1;
-  if (wanted <= 0 || image.width() < least || image.height() < least) return;
+  const int border = 2 * std::max(1, config_.border);
+  const int least_width = border + static_cast<int>(kWideLanes);
+  if (wanted <= 0 || image.width() < least_width || image.height() <= border) return;
   masked_ = mask != nullptr && !mask->empty();
   if (masked_) erode_mask(*mask);
   allowed_row_.assign(static_cast<std::size_t>(image.width()), 1.0F);
@@ -134,24 +146,39 @@ void PixelSelector::select(const ImagePyramid& pyramid, const ImageU8* mask, int
   if (out->size() > static_cast<std::size_t>(wanted)) thin(wanted, out);
 }
 
-void PixelSelector::compute_thresholds(const ImageF& image) {
-  const int side = std::max(8, config_.threshold_block);
+/// Median of |grad I| over every second pixel of every second row of each region.
+void PixelSelector::compute_medians(const ImageF& image) {
   const int w = image.width();
   const int h = image.height();
-  regions_x_ = std::max(1, (w + side / 2) / side);
-  regions_y_ = std::max(1, (h + side / 2) / side);
-  medians_.resize(static_cast<std::size_t>(regions_x_) * regions_y_);
-  thresholds_.resize(medians_.size());
+  gradient_row_.resize(static_cast<std::size_t>(w));
   for (int ry = 0; ry < regions_y_; ++ry) {
-    const int y0 = std::max(1, region_begin(ry, regions_y_, h));
+    histograms_.assign(static_cast<std::size_t>(regions_x_), {});
     const int y1 = std::min(h - 1, region_begin(ry + 1, regions_y_, h));
+    for (int y = std::max(1, region_begin(ry, regions_y_, h)); y < y1; y += 2) {
+      run_kernel<GradientSteps>(image.row(y), std::ptrdiff_t{w}, 1, w - 1, gradient_row_.data());
+      for (int rx = 0; rx < regions_x_; ++rx) {
+        auto& histogram = histograms_[static_cast<std::size_t>(rx)];
+        const int x1 = std::min(w - 1, region_begin(rx + 1, regions_x_, w));
+        for (int x = std::max(1, region_begin(rx, regions_x_, w)); x < x1; x += 2) {
+          ++histogram[static_cast<std::size_t>(gradient_row_[static_cast<std::size_t>(x)])];
+        }
+      }
+    }
     for (int rx = 0; rx < regions_x_; ++rx) {
-      const int x0 = std::max(1, region_begin(rx, regions_x_, w));
-      const int x1 = std::min(w - 1, region_begin(rx + 1, regions_x_, w));
       medians_[static_cast<std::size_t>(ry * regions_x_ + rx)] =
-          median_gradient(image, x0, x1, y0, y1) + static_cast<float>(config_.threshold_offset);
+          median_of(histograms_[static_cast<std::size_t>(rx)]);
     }
   }
+}
+
+void PixelSelector::compute_thresholds(const ImageF& image) {
+  const int side = std::max(8, config_.threshold_block);
+  regions_x_ = std::max(1, (image.width() + side / 2) / side);
+  regions_y_ = std::max(1, (image.height() + side / 2) / side);
+  medians_.resize(static_cast<std::size_t>(regions_x_) * regions_y_);
+  thresholds_.resize(medians_.size());
+  compute_medians(image);
+  for (float& median : medians_) median += static_cast<float>(config_.threshold_offset);
   for (int ry = 0; ry < regions_y_; ++ry) {
     for (int rx = 0; rx < regions_x_; ++rx) {
       float sum = 0.0F;

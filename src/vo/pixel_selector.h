@@ -36,6 +36,10 @@ struct PixelSelectorConfig {
   }
 };
 
+/// Pixels by |grad I| in whole grey levels a pixel; the last one's are all with more.
+inline constexpr int kMostGradient = 48;
+using GradientHistogram = std::array<int, kMostGradient + 1>;
+
 /// A pixel chosen for tracking.
 struct SelectedPixel {
   std::int16_t x = 0;            ///< At level 0.
@@ -67,6 +71,7 @@ class PixelSelector {
 
  private:
   void compute_thresholds(const ImageF& image);
+  void compute_medians(const ImageF& image);
   void erode_mask(const ImageU8& mask);
   void select_all_levels(const ImagePyramid& pyramid, std::vector<SelectedPixel>* out);
   void select_level(const ImagePyramid& pyramid, int level, std::vector<SelectedPixel>* out);
@@ -84,6 +89,8 @@ class PixelSelector {
 
   int regions_x_ = 0, regions_y_ = 0;
   std::vector<float> medians_, thresholds_;       // per region; thresholds are squared gradients
+  std::vector<GradientHistogram> histograms_;     // per region of a row of them
+  AlignedVector<std::int32_t> gradient_row_;      // per column, whole grey levels / px
   std::array<std::vector<std::uint8_t>, 3> hit_;  // per block of a level: it or a finer one hit
   std::array<int, 3> blocks_x_{}, blocks_y_{};
   AlignedVector<float> direction_x_, direction_y_, threshold_row_;  // per column of a level

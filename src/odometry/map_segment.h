@@ -62,7 +62,10 @@ class MapSegment {
   bool initialize(const MonoFrame& frame, const SideImage* right);
   const std::string& reason() const { return reason_; }
 
-  TrackedFrame track(const MonoFrame& frame) { return vo_.track(frame); }
+  /// Tracks a frame. The limit of acceleration counts once the map has metres.
+  TrackedFrame track(const MonoFrame& frame) {
+    return vo_.track(frame, scale_status().locked ? config_.max_acceleration : 0.0);
+  }
 
   /// Maps a tracked frame. `right` may be null (missing): then there is no scale job.
   MappingOutcome map(const TrackedFrame& tracked, const SideImage* right);

@@ -59,7 +59,8 @@ struct StereoOdometryConfig {
   int mapping_queue = 4;          ///< Live: frames that may wait for mapping before one is dropped.
   bool wait_for_mapping = false;  ///< Live: wait instead of dropping.
   int lost_frames = 5;  ///< Frames in a row without a pose after which a new segment begins.
-  double scale_timeout_s = 3.0;  ///< Without an accepted scale: state SCALE_UNOBSERVED.
+  double max_acceleration = 100.0;  ///< A pose that takes more is none [m/s^2]; 0: any is taken.
+  double scale_timeout_s = 3.0;     ///< Without an accepted scale: state SCALE_UNOBSERVED.
   DirectConfig vo;
   ScaleOptimizerConfig scale;
   ScaleFilterConfig filter;
@@ -80,6 +81,8 @@ struct StereoOdometryConfig {
     v("mapping_queue", mapping_queue, "frames that may wait for mapping before one is dropped");
     v("wait_for_mapping", wait_for_mapping, "wait for mapping instead of dropping frames");
     v("lost_frames", lost_frames, "frames in a row without a pose that begin a new segment");
+    v("max_acceleration", max_acceleration,
+      "a pose that takes more since the frames before is none [m/s^2]; 0: no limit");
     v("scale_timeout_s", scale_timeout_s, "without an accepted scale: SCALE_UNOBSERVED [s]");
     v("vo", vo, "direct monocular odometry");
     v("scale", scale, "scale optimization");

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -83,6 +84,8 @@ struct KnownMotion {
   SE3 expected;
   SE3 last;
   double steps = 1.0;  ///< Time since then over that between the two frames before.
+  /// How far from there it may be, at the greatest acceleration [m]; infinite: not known.
+  double reach = std::numeric_limits<double>::infinity();
 };
 
 /// Direct sparse odometry of one camera: tracking of every frame, a sliding window of keyframes,
@@ -104,8 +107,10 @@ class DirectOdometry {
   void begin(const MonoFrame& frame, const SE3& T_world_camera,
              const std::vector<StartPoint>& points);
 
-  /// Tracks a frame against the newest reference. `tracking.good` is false when it is lost.
-  TrackedFrame track(const MonoFrame& frame);
+  /// Tracks a frame against the newest reference. `tracking.good` is false when it is lost, also
+  /// when only a pose fits that takes more than `max_acceleration` since the frames before [the
+  /// map's unit of length / s^2]; 0: no such limit is known.
+  TrackedFrame track(const MonoFrame& frame, double max_acceleration = 0.0);
 
   /// The same from a known motion since the newest keyframe.
   TrackedFrame track_from(const MonoFrame& frame, const SE3& T_current_reference);
@@ -146,7 +151,11 @@ class DirectOdometry {
   void take_snapshot();
   TrackedFrame track_hypotheses(const MonoFrame& frame,
                                 std::shared_ptr<const TrackingReference> reference);
-  void find_motion_hypotheses(const TrackingReference& reference, const MonoFrame& frame);
+  void find_motion_hypotheses(const TrackingReference& reference, const MonoFrame& frame,
+                              double max_acceleration);
+  /// The tracker's best of these motions; not good when the camera cannot be there.
+  TrackingResult track_from_any(const TrackingReference& reference, const MonoFrame& frame,
+                                std::span<const SE3> hypotheses);
   /// From the likely motions, and when none fits as expected, from those of a camera that was
   /// knocked.
   TrackingResult align(const TrackingReference& reference, const MonoFrame& frame);

@@ -41,6 +41,10 @@ std::vector<SE3> unknown_motions(const SE3& around, double mean_rho) {
 
 constexpr std::size_t kMotionsKept = 4;
 
+double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
+  return 1e-9 * static_cast<double>(to_ns - from_ns);
+}
+
 SE3 scaled_motion(const SE3& motion, double factor) { return SE3::exp(factor * motion.log()); }
 
 /// Steps to either side of a grid, of which the outermost is at `reach`, or nearer when that takes
@@ -88,10 +92,16 @@ std::vector<SE3> knocked_motions(const KnownMotion& known, const CameraModel& le
   return out;
 }
 
+/// Whether a camera that was on its way can be where it was found.
+bool is_reachable(const KnownMotion& known, const SE3& T_current_reference) {
+  const Vec3 found = T_current_reference.inverse().translation();
+  return (found - known.expected.inverse().translation()).norm() <= known.reach;
+}
+
 }  // namespace
 
 void DirectOdometry::find_motion_hypotheses(const TrackingReference& reference,
-                                            const MonoFrame& frame) {
+                                            const MonoFrame& frame, double max_acceleration) {
   const SE3 T_reference_world = reference.T_world_camera.inverse();
   // Past frames relative to the reference, in its scale.
   std::array<SE3, 2> from_reference;
@@ -119,32 +129,45 @@ void DirectOdometry::find_motion_hypotheses(const TrackingReference& reference,
   // Constant velocity over the true time between the frames, which may have been dropped.
   const SE3 motion = last * from_reference[0].inverse();
   const SE3 expected = scaled_motion(motion, expected_steps_) * last;
-  known_motion_ = {expected, last, expected_steps_};
+  known_motion_ = {.expected = expected, .last = last, .steps = expected_steps_};
+  if (max_acceleration > 0.0) {
+    // The velocity is that of the middle between the past frames.
+    const double before = seconds_between(past_[0].stamp_ns, past_[1].stamp_ns);
+    const double since = seconds_between(past_[1].stamp_ns, frame.stamp_ns);
+    known_motion_->reach = 0.5 * max_acceleration * std::abs(since * (since + before));
+  }
   hypotheses_ = {expected, scaled_motion(motion, 2.0 * expected_steps_) * last,
                  scaled_motion(motion, 0.5 * expected_steps_) * last, last, SE3()};
 }
 
+TrackingResult DirectOdometry::track_from_any(const TrackingReference& reference,
+                                              const MonoFrame& frame,
+                                              std::span<const SE3> hypotheses) {
+  TrackingResult out = tracker_.track(reference, *frame.pyramid, frame.exposure_s, last_affine_,
+                                      hypotheses, last_tracking_);
+  if (known_motion_ && !is_reachable(*known_motion_, out.T_current_reference)) out.good = false;
+  return out;
+}
+
 TrackingResult DirectOdometry::align(const TrackingReference& reference, const MonoFrame& frame) {
-  TrackingResult likely = tracker_.track(reference, *frame.pyramid, frame.exposure_s, last_affine_,
-                                         hypotheses_, last_tracking_);
+  TrackingResult likely = track_from_any(reference, frame, hypotheses_);
   if (!known_motion_ || (likely.good && likely.as_expected)) return likely;
   const std::vector<SE3> knocked =
       tracker_.rank(reference, *frame.pyramid, frame.exposure_s, last_affine_,
                     knocked_motions(*known_motion_, reference.levels.back().camera), kMotionsKept);
-  TrackingResult found = tracker_.track(reference, *frame.pyramid, frame.exposure_s, last_affine_,
-                                        knocked, last_tracking_);
+  TrackingResult found = track_from_any(reference, frame, knocked);
   const bool better = found.good && (!likely.good || found.rmse < likely.rmse);
   return better ? found : likely;
 }
 
-TrackedFrame DirectOdometry::track(const MonoFrame& frame) {
+TrackedFrame DirectOdometry::track(const MonoFrame& frame, double max_acceleration) {
   expected_steps_ = 1.0;
   if (past_.size() == 2 && past_[1].stamp_ns > past_[0].stamp_ns) {
     const auto before = static_cast<double>(past_[1].stamp_ns - past_[0].stamp_ns);
     expected_steps_ = static_cast<double>(frame.stamp_ns - past_[1].stamp_ns) / before;
   }
   auto ref = reference();
-  find_motion_hypotheses(*ref, frame);
+  find_motion_hypotheses(*ref, frame, max_acceleration);
   return track_hypotheses(frame, std::move(ref));
 }
 

@@ -210,15 +210,21 @@ void PointActivator::optimize(const Window& window, double mean_rho, Candidate* 
   p.rho = best_rho;
   p.hessian = now.hessian;
   int inliers = 0;
+  int outliers = 0;
   for (int t = 0; t < window.size(); ++t) {
     const LinearizedResidual& r = now.residuals[static_cast<std::size_t>(t)];
-    if (t == candidate->host || r.state != ResidualState::kIn) continue;
+    if (t == candidate->host) continue;
+    if (r.state == ResidualState::kOutlier) ++outliers;
+    if (r.state != ResidualState::kIn) continue;
     p.residuals[static_cast<std::size_t>(window[t].slot)] = {ResidualState::kIn, r.raw_energy,
                                                              r.centre_u, r.centre_v, r.centre_rho};
     ++inliers;
   }
   candidate->discard = true;  // the immature point goes, as an active one or for good
-  if (inliers == 0 || !std::isfinite(p.rho) || p.rho <= 0.0) return;
+  // What most keyframes deny moves by itself, a car ahead: stereo knows its depth, the map has no
+  // place for it.
+  if (inliers == 0 || inliers < outliers) return;
+  if (!std::isfinite(p.rho) || p.rho <= 0.0) return;
   p.last_state =
       p.residuals[static_cast<std::size_t>(window.newest().slot)].state == ResidualState::kIn
           ? ResidualState::kIn

@@ -73,6 +73,25 @@ TEST_F(Map, UnrelatedImageIsLostAndTheMapGoesOn) {
   EXPECT_TRUE(vo_.track(frame_at(scene_, SE3(SO3(), Vec3(0.02, 0, 0)), 2)).tracking.good);
 }
 
+TEST_F(Map, APoseOutOfReachIsNone) {
+  for (int i = 1; i <= 2; ++i) {
+    const SE3 slow(SO3(), Vec3(0.01 * i, 0, 0));
+    ASSERT_TRUE(vo_.track(frame_at(scene_, slow, i), 100.0).tracking.good);
+  }
+  // From 0.2 m/s to 6 m/s in one frame: 116 m/s^2.
+  const MonoFrame leap = frame_at(scene_, SE3(SO3(), Vec3(0.32, 0, 0)), 3);
+  EXPECT_FALSE(vo_.track(leap, 100.0).tracking.good);
+  EXPECT_TRUE(vo_.track(leap, 140.0).tracking.good);
+}
+
+TEST_F(Map, AnyLeapIsTakenWhereNoLimitIsKnown) {
+  for (int i = 1; i <= 2; ++i) {
+    const SE3 slow(SO3(), Vec3(0.01 * i, 0, 0));
+    ASSERT_TRUE(vo_.track(frame_at(scene_, slow, i)).tracking.good);
+  }
+  EXPECT_TRUE(vo_.track(frame_at(scene_, SE3(SO3(), Vec3(0.32, 0, 0)), 3)).tracking.good);
+}
+
 /// Poses of a drive: forward and to the side, turning a little.
 SE3 drive(int i) {
   const double s = 0.025 * i;

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <random>
+#include <utility>
+
+#include "vo/window_test_support.h"
 
 namespace sovo {
 namespace {
@@ -37,6 +40,46 @@ TEST(OccupancyMap, FindsTakenPixelsAsSearchingAllOfThemDoes) {
   }
   EXPECT_GT(near, 300);
   EXPECT_GT(far, 300);
+}
+
+/// Immature points of the first of four keyframes at their true depths; the last ones see another
+/// world where these points are, as they see a car's place when it has driven on.
+int activated_when_denied_by(int keyframes) {
+  using namespace test;
+  const SyntheticScene scene(3);
+  const SyntheticScene elsewhere(11);
+  const CameraModel camera = small_camera();
+  Window window(camera);
+  std::vector<SE3> poses;
+  for (int i = 0; i < 4; ++i) poses.push_back(keyframe_pose(i));
+  for (int i = 0; i < 4; ++i) {
+    const bool other = i >= 4 - keyframes;
+    const auto at = poses[static_cast<std::size_t>(i)];
+    window.insert(make_keyframe(static_cast<std::uint32_t>(i),
+                                scene_view(other ? elsewhere : scene, camera, at), at));
+  }
+  Keyframe& host = window[0];
+  for (const Point& known : scene_points(scene, camera, host.image(), poses, 0, 9)) {
+    ImmaturePoint p;
+    if (!make_immature_point(host.image(), known.u, known.v, 1, PointConfig(),
+                             WindowConfig().gradient_constant, &p)) {
+      continue;
+    }
+    p.rho_min = p.rho_max = static_cast<float>(known.rho);
+    p.interval_px = 1.0F;
+    p.state = TraceState::kGood;
+    host.immature.push_back(p);
+  }
+  window.update_geometry();
+  WorkerPool pool(1);
+  return PointActivator(PointConfig(), WindowConfig(), &pool).activate(&window);
+}
+
+TEST(PointActivator, APointThatMostKeyframesDenyIsNone) {
+  const int all = activated_when_denied_by(0);
+  EXPECT_GT(all, 50);
+  EXPECT_GT(activated_when_denied_by(1), 0.9 * all) << "one of three may be hidden";
+  EXPECT_LT(activated_when_denied_by(2), 0.4 * all) << "some fit by chance";
 }
 
 }  // namespace

@@ -27,7 +27,9 @@ TEST(OccupancyMap, FindsTakenPixelsAsSearchingAllOfThemDoes) {
       taken.push_back(pixel());
       map.take(taken.back().first, taken.back().second);
     }
-    const auto [x, y] = pixel();
+    const auto place = pixel();
+    const int x = place.first;
+    const int y = place.second;
     const float distance = 0.1F * static_cast<float>(random() % 170);
     const bool expected = std::any_of(taken.begin(), taken.end(), [&](const auto& other) {
       const int dx = std::abs(x - other.first);

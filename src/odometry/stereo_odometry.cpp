@@ -136,7 +136,7 @@ class StereoOdometry::Impl {
       tracked = segment_->track(left);
     }
     if (map_broke_down() || !tracked.tracking.good) {
-      lose(out);
+      lose(tracked.tracking, out);
       return;
     }
     failures_ = 0;
@@ -160,11 +160,17 @@ class StereoOdometry::Impl {
     return rotated(tracked.T_world_camera.rotation(), information.inverse());
   }
 
-  void lose(OdometryOutput* out) {
+  std::string why_lost(const TrackingResult& tracking) const {
+    if (map_broke_down()) return "the map broke down";
+    if (!tracking.out_of_reach) return "this frame does not fit the map";
+    return "this frame fits the map only where max_acceleration does not let the camera be";
+  }
+
+  void lose(const TrackingResult& tracking, OdometryOutput* out) {
     ++failures_;
     out->state = OdometryState::kLost;
     out->pose_valid = false;
-    out->reason = map_broke_down() ? "the map broke down" : "this frame does not fit the map";
+    out->reason = why_lost(tracking);
     if (failures_ < config_.lost_frames && !map_broke_down()) return;
     out->reason += "; a new segment begins";
     end_segment();

@@ -24,7 +24,8 @@ PointMotion motion_of_points(const TrackingReference& reference, const SE3& T_cu
 /// How a frame was tracked.
 struct TrackingResult {
   bool good = false;
-  bool as_expected = false;  ///< It fits as well as the last frame lets expect.
+  bool as_expected = false;   ///< It fits as well as the last frame lets expect.
+  bool out_of_reach = false;  ///< Not good only since the camera cannot have come there.
   SE3 T_current_reference;
   Affine affine;              ///< Of the current frame.
   double rmse = 0.0;          ///< Of the finest level, saturated residuals at the cutoff.

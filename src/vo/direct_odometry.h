@@ -84,7 +84,8 @@ struct KnownMotion {
   SE3 expected;
   SE3 last;
   double steps = 1.0;  ///< Time since then over that between the two frames before.
-  /// How far from there it may be, at the greatest acceleration [m]; infinite: not known.
+  /// How far from there it may be, at the greatest acceleration and with what stamps and poses err
+  /// by [the map's unit of length]; infinite: not known.
   double reach = std::numeric_limits<double>::infinity();
 };
 

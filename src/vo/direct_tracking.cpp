@@ -134,7 +134,10 @@ void DirectOdometry::find_motion_hypotheses(const TrackingReference& reference,
     // The velocity is that of the middle between the past frames.
     const double before = seconds_between(past_[0].stamp_ns, past_[1].stamp_ns);
     const double since = seconds_between(past_[1].stamp_ns, frame.stamp_ns);
-    known_motion_->reach = 0.5 * max_acceleration * std::abs(since * (since + before));
+    // Stamps and poses err as well, which counts where frames are close in time.
+    constexpr double kErrors = 0.02;  // of the mean depth
+    known_motion_->reach =
+        0.5 * max_acceleration * std::abs(since * (since + before)) + kErrors / reference.mean_rho;
   }
   hypotheses_ = {expected, scaled_motion(motion, 2.0 * expected_steps_) * last,
                  scaled_motion(motion, 0.5 * expected_steps_) * last, last, SE3()};
@@ -145,7 +148,10 @@ TrackingResult DirectOdometry::track_from_any(const TrackingReference& reference
                                               std::span<const SE3> hypotheses) {
   TrackingResult out = tracker_.track(reference, *frame.pyramid, frame.exposure_s, last_affine_,
                                       hypotheses, last_tracking_);
-  if (known_motion_ && !is_reachable(*known_motion_, out.T_current_reference)) out.good = false;
+  if (out.good && known_motion_ && !is_reachable(*known_motion_, out.T_current_reference)) {
+    out.good = false;
+    out.out_of_reach = true;
+  }
   return out;
 }
 

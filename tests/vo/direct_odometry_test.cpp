@@ -76,12 +76,24 @@ TEST_F(Map, UnrelatedImageIsLostAndTheMapGoesOn) {
 TEST_F(Map, APoseOutOfReachIsNone) {
   for (int i = 1; i <= 2; ++i) {
     const SE3 slow(SO3(), Vec3(0.01 * i, 0, 0));
-    ASSERT_TRUE(vo_.track(frame_at(scene_, slow, i), 100.0).tracking.good);
+    ASSERT_TRUE(vo_.track(frame_at(scene_, slow, i), 50.0).tracking.good);
   }
   // From 0.2 m/s to 6 m/s in one frame: 116 m/s^2.
   const MonoFrame leap = frame_at(scene_, SE3(SO3(), Vec3(0.32, 0, 0)), 3);
-  EXPECT_FALSE(vo_.track(leap, 100.0).tracking.good);
+  const TrackingResult refused = vo_.track(leap, 50.0).tracking;
+  EXPECT_FALSE(refused.good);
+  EXPECT_TRUE(refused.out_of_reach);
   EXPECT_TRUE(vo_.track(leap, 140.0).tracking.good);
+}
+
+TEST_F(Map, ErrorsOfFastFramesAreNoAcceleration) {
+  // A millisecond apart, 6 mm beside the way would be 6000 m/s^2.
+  for (int i = 1; i <= 6; ++i) {
+    const SE3 jittering(SO3(), Vec3(0.01 + (i % 3 == 0 ? 0.006 : 0.0), 0, 0));
+    MonoFrame frame = frame_at(scene_, jittering, 0);
+    frame.stamp_ns += 1'000'000LL * i;
+    EXPECT_TRUE(vo_.track(frame, 100.0).tracking.good) << "frame " << i;
+  }
 }
 
 TEST_F(Map, AnyLeapIsTakenWhereNoLimitIsKnown) {

@@ -57,7 +57,7 @@ void Renderer::render(const SE3& T_world_camera, double t, RenderedImage* image)
   const CameraModel& camera = rays_.camera();
   image->light.resize(camera.width, camera.height);
   image->range.resize(camera.width, camera.height);
-  view_.update(T_world_camera);
+  view_.update(T_world_camera, t);
   shader_.update(T_world_camera, t);
   find_surfaces();
   for (int tile = 0; tile < rays_.num_tiles(); ++tile) shade_tile(tile, image);

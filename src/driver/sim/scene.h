@@ -2,11 +2,13 @@
 
 #include <Eigen/Geometry>
 #include <array>
+#include <functional>
+#include <optional>
 #include <vector>
 
 #include "sovo/driver/sim/patterns.h"
 #include "sovo/driver/sim/texture.h"
-#include "sovo/geometry/types.h"
+#include "sovo/geometry/se3.h"
 
 namespace sovo::sim {
 
@@ -61,6 +63,14 @@ struct Surface {
   float foot_shade = 0.0F;  ///< Darkening at its lower end (world z = 0), 0 to 1.
 };
 
+/// Surfaces that move together: they are given in a frame of their own.
+struct Mover {
+  std::size_t first = 0;  ///< Of its surfaces.
+  std::size_t last = 0;   ///< One beyond them.
+  /// T_world_mover at a time of the world [s]; nothing while it is not there.
+  std::function<std::optional<SE3>(double t)> place;
+};
+
 /// Something small and soft that drifts in the water.
 struct Particles {
   int count = 0;
@@ -85,6 +95,7 @@ struct Scene {
   std::vector<Texture> textures;
   std::vector<Material> materials;
   std::vector<Surface> surfaces;
+  std::vector<Mover> movers;  ///< Of the last surfaces, in their order.
   Particles particles;
   Sky sky;
   Vec3 to_sun = Vec3(0.4, 0.3, 0.86).normalized();

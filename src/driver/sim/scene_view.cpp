@@ -123,18 +123,27 @@ void cover_rays(const SurfaceView& view, int index, const Rays& rays, float* ran
   }
 }
 
-void SceneView::update(const SE3& T_world_camera) {
-  const SE3 T_camera_world = T_world_camera.inverse();
-  views_.clear();
-  solid_.clear();
-  pierced_.clear();
-  for (std::size_t i = 0; i < scene_->surfaces.size(); ++i) {
+void SceneView::add(std::size_t first, std::size_t last, const SE3& T_frame_camera) {
+  const SE3 T_camera_frame = T_frame_camera.inverse();
+  for (std::size_t i = first; i < last; ++i) {
     const Surface& s = scene_->surfaces[i];
-    const bool away = s.n.dot(T_world_camera.translation() - s.centre) <= 0.0;
+    const bool away = s.n.dot(T_frame_camera.translation() - s.centre) <= 0.0;
     if (s.shape == Shape::kQuad && away && !s.two_sided) continue;
     const auto& material = scene_->materials[static_cast<std::size_t>(s.material)];
     (material.opacity < 0 ? solid_ : pierced_).push_back(static_cast<int>(views_.size()));
-    views_.push_back(view_of(s, static_cast<int>(i), T_camera_world));
+    views_.push_back(view_of(s, static_cast<int>(i), T_camera_frame));
+  }
+}
+
+void SceneView::update(const SE3& T_world_camera, double t) {
+  views_.clear();
+  solid_.clear();
+  pierced_.clear();
+  const auto& movers = scene_->movers;
+  add(0, movers.empty() ? scene_->surfaces.size() : movers.front().first, T_world_camera);
+  for (const Mover& mover : movers) {
+    const std::optional<SE3> T_world_mover = mover.place(t);
+    if (T_world_mover) add(mover.first, mover.last, T_world_mover->inverse() * T_world_camera);
   }
   const auto at = [this](int i) -> const SurfaceView& {
     return views_[static_cast<std::size_t>(i)];

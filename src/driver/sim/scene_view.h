@@ -50,8 +50,8 @@ class SceneView {
  public:
   explicit SceneView(const Scene& scene) : scene_(&scene) {}
 
-  /// Moves the camera.
-  void update(const SE3& T_world_camera);
+  /// Moves the camera, and what moves on its own, to time `t` of the world [s].
+  void update(const SE3& T_world_camera, double t);
 
   /// All that may be seen; the lists below hold indices into it.
   const std::vector<SurfaceView>& views() const { return views_; }
@@ -63,6 +63,9 @@ class SceneView {
   void select(const RayCone& cone, const std::vector<int>& from, std::vector<int>* to) const;
 
  private:
+  /// Adds surfaces [first, last), given in a frame of their own, that may be seen.
+  void add(std::size_t first, std::size_t last, const SE3& T_frame_camera);
+
   const Scene* scene_;
   std::vector<SurfaceView> views_;
   std::vector<int> solid_;

@@ -17,6 +17,15 @@ enum class World {
 /// A side of the pair, or neither.
 enum class Side { kNone, kLeft, kRight };
 
+/// Vehicles that move on the road.
+enum class Traffic {
+  kNone,
+  kCar,         ///< A car ahead, at the camera's own speed.
+  kLorry,       ///< A lorry close ahead, at the camera's own speed, that hides what is ahead.
+  kOvertaking,  ///< Cars overtake.
+  kOncoming,    ///< Cars come towards the camera.
+};
+
 /// Of which body a trajectory file's poses are.
 enum class TrajectoryBody {
   kAuto,    ///< Found out from the poses, see `load_motion`.
@@ -34,6 +43,13 @@ constexpr std::array<std::pair<World, const char*>, 4> enum_names(World) {
 }
 constexpr const char* name_of(World world) {
   return enum_names(world)[static_cast<std::size_t>(world)].second;
+}
+constexpr std::array<std::pair<Traffic, const char*>, 5> enum_names(Traffic) {
+  return {{{Traffic::kNone, "none"},
+           {Traffic::kCar, "car"},
+           {Traffic::kLorry, "lorry"},
+           {Traffic::kOvertaking, "overtaking"},
+           {Traffic::kOncoming, "oncoming"}}};
 }
 constexpr std::array<std::pair<Side, const char*>, 3> enum_names(Side) {
   return {{{Side::kNone, "none"}, {Side::kLeft, "left"}, {Side::kRight, "right"}}};
@@ -112,6 +128,7 @@ struct SimConfig {
   std::string trajectory;
   std::string trajectory_times;
   TrajectoryBody trajectory_body = TrajectoryBody::kAuto;
+  Traffic traffic = Traffic::kNone;
   int threads = 2;
   SensorConfig sensor;
 
@@ -133,6 +150,8 @@ struct SimConfig {
       "world's first");
     v("trajectory_times", trajectory_times, "KITTI times file of the trajectory");
     v("trajectory_body", trajectory_body, "of which body the trajectory file's poses are");
+    v("traffic", traffic,
+      "vehicles that move in the street: none, car or lorry ahead, overtaking or oncoming");
     v("threads", threads, "1 or 2: cameras rendered at once; changes no pixel");
     v("sensor", sensor, "what the cameras do to the light");
   }

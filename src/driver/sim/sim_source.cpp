@@ -69,6 +69,9 @@ Result<void> check(const SimConfig& config) {
   if (config.frame_rate < 0.0 || config.frame_rate > 1000.0) {
     return Error{"frame_rate must be at most 1000 Hz, or 0 for the world's own"};
   }
+  if (config.traffic != Traffic::kNone && config.world != World::kStreet) {
+    return Error{"there is traffic in the street only; leave it at none, or choose that world"};
+  }
   if (config.start < 0) return Error{"start must not be negative"};
   if (!(s.veil >= 0.0 && s.veil <= 0.99)) return Error{"sensor.veil must be in [0, 0.99]"};
   if (!(s.light_factor >= 0.01 && s.light_factor <= 100.0)) {
@@ -94,7 +97,7 @@ SimSource::SimSource(const SimConfig& config, Calibration calibration, Motion mo
     : config_(config),
       calibration_(std::move(calibration)),
       motion_(std::move(motion)),
-      scene_(build_scene(config.world, motion_, config.seed)),
+      scene_(build_scene(config.world, motion_, config.seed, config.traffic)),
       frame_rate_(config.frame_rate > 0.0 ? config.frame_rate : own_frame_rate(config.world)),
       delivered_(choose_pairs(config, motion_, frame_rate_)),
       left_(scene_, calibration_.rig.left),

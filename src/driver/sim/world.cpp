@@ -2,14 +2,14 @@
 
 namespace sovo::sim {
 
-Scene build_scene(World world, const Motion& motion, std::uint64_t seed) {
+Scene build_scene(World world, const Motion& motion, std::uint64_t seed, Traffic traffic) {
   switch (world) {
     case World::kLawn:
       return build_lawn(motion, seed);
     case World::kPool:
       return build_pool(motion, seed);
     case World::kStreet:
-      return build_street(motion, seed);
+      return build_street(motion, seed, traffic);
     case World::kHall:
       break;
   }

@@ -30,13 +30,15 @@ double own_frame_rate(World world);
 /// changes of height are taken away, for their ground is level.
 Result<Motion> load_motion(const SimConfig& config, const StereoRig& rig);
 
-/// The world around a motion: nothing stands in its way.
-Scene build_scene(World world, const Motion& motion, std::uint64_t seed);
+/// The world around a motion: nothing stands in its way. Precondition: `traffic` in the street
+/// only.
+Scene build_scene(World world, const Motion& motion, std::uint64_t seed,
+                  Traffic traffic = Traffic::kNone);
 
 // The single worlds.
 Scene build_lawn(const Motion& motion, std::uint64_t seed);
 Scene build_pool(const Motion& motion, std::uint64_t seed);
-Scene build_street(const Motion& motion, std::uint64_t seed);
+Scene build_street(const Motion& motion, std::uint64_t seed, Traffic traffic);
 Scene build_hall(const Motion& motion, std::uint64_t seed);
 
 }  // namespace sovo::sim

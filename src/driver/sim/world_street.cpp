@@ -5,6 +5,8 @@
 #include "sovo/driver/sim/noise.h"
 #include "sovo/driver/sim/random.h"
 #include "sovo/driver/sim/surroundings.h"
+#include "sovo/driver/sim/traffic.h"
+#include "sovo/driver/sim/vehicles.h"
 #include "sovo/driver/sim/world.h"
 
 namespace sovo::sim {
@@ -83,6 +85,17 @@ StreetMaterials street_materials(SceneBuilder& b, int noise, std::uint64_t seed)
     m.leaves.push_back(b.cutout(leaf_cutout(256, 230, 0.07, seed + 40 + i), 3.1, 3.1));
   }
   return m;
+}
+
+/// Of the vehicles that move; a lorry's sides are painted with large figures.
+TrafficMaterials traffic_materials(SceneBuilder& b, const StreetMaterials& m, int noise,
+                                   std::uint64_t seed) {
+  TrafficMaterials out{m.cars, 0, m.glass, m.block_shadow};
+  const int figures = b.texture(machine_pattern(256, seed));
+  out.lorry_paint = add_material(
+      b, 0.1F,
+      {layer(figures, 2.6, Blend::kMax, 1.0F), layer(noise, 1.9, Blend::kMultiply, 0.5F, 0.4)});
+  return out;
 }
 
 /// The middle line of the road, every two metres.
@@ -229,16 +242,7 @@ class StreetBuilder {
     const Vec3 foot = beside(p, left, 0.12);
     if (way_.near_box(foot.x(), foot.y(), p.heading, 4.4, 1.8, 1.6)) return;
     const int paint = m_.cars[static_cast<std::size_t>(random_.below(5))];
-    const std::size_t first = b_.box(foot, p.heading, {4.2, 1.75, 0.85}, paint, paint);
-    for (std::size_t i = first; i < first + 5; ++i) {
-      Surface& s = b_.scene().surfaces[i];
-      s.texture_x = 2.1;
-      s.texture_y = i == first + 4 ? 0.02 : 0.475;  // the top shows paint only
-      s.foot_shade = 0.0F;
-    }
-    const Vec3 back(-0.25 * std::cos(p.heading), -0.25 * std::sin(p.heading), 0.85);
-    b_.box(foot + back, p.heading, {2.3, 1.5, 0.52}, m_.glass, paint);
-    b_.shadow(Vec3(foot.x(), foot.y(), 0.014), p.heading, 5.2, 2.7, m_.block_shadow);
+    add_car(b_, {paint, m_.glass, m_.block_shadow}, foot, p.heading);
   }
 
   void furniture(int side) {
@@ -273,7 +277,7 @@ class StreetBuilder {
 
 }  // namespace
 
-Scene build_street(const Motion& motion, std::uint64_t seed) {
+Scene build_street(const Motion& motion, std::uint64_t seed, Traffic traffic) {
   SceneBuilder b;
   b.scene().to_sun = Vec3(0.35, -0.5, 0.79).normalized();
   b.scene().ambient = 0.55F;
@@ -286,6 +290,7 @@ Scene build_street(const Motion& motion, std::uint64_t seed) {
   b.scene().haze = 0.0018;
   b.scene().haze_colour = 0.8F;
   StreetBuilder(b, m, motion, combine(seed, 45)).build();
+  add_traffic(traffic, motion, traffic_materials(b, m, noise, combine(seed, 46)), b);
   return b.take();
 }
 

@@ -120,6 +120,18 @@ double expected_inlier_ratio(const TrackerConfig& config, const LastTracking& la
   return std::min(steady, config.sure_inlier_ratio);
 }
 
+/// What fits by chance lies anywhere: a pose to which the motion led needs less to be believed.
+double least_correlation(const TrackerConfig& config, const LastTracking& last,
+                         const TrackingResult& found, double mean_rho) {
+  constexpr double kTurn = 0.02;   // [rad]
+  constexpr double kShift = 0.02;  // mean depths
+  if (!last.expected) return config.min_correlation;
+  const SE3 off = found.T_current_reference * last.expected->inverse();
+  const bool on_way =
+      off.rotation().log().norm() < kTurn && off.translation().norm() * mean_rho < kShift;
+  return on_way ? config.min_correlation_on_way : config.min_correlation;
+}
+
 /// Sums of pairs of values.
 struct Moments {
   double n = 0.0, x = 0.0, y = 0.0, xx = 0.0, yy = 0.0, xy = 0.0;
@@ -332,7 +344,7 @@ TrackingResult CoarseTracker::track(const TrackingReference& reference, const Im
   if (!best.good) return best;
   best.correlation = correlation(reference.levels[0], pyramid.level(0), best.T_current_reference);
   best.good = best.rmse < config_.max_rmse && best.inlier_ratio > config_.min_inlier_ratio &&
-              best.correlation > config_.min_correlation;
+              best.correlation > least_correlation(config_, last, best, reference.mean_rho);
   best.motion = motion_of_points(reference, best.T_current_reference);
   return best;
 }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -38,10 +39,11 @@ struct TrackingResult {
   int hypothesis = 0;               ///< Which motion hypothesis was taken.
 };
 
-/// How well the last frame was tracked.
+/// How well the last frame was tracked, and where the motion so far leads.
 struct LastTracking {
   double rmse = 0.0;  ///< 0: nothing is known of it.
   double inlier_ratio = 1.0;
+  std::optional<SE3> expected = std::nullopt;  ///< T_current_reference of the new frame.
 };
 
 /// Direct image alignment of a frame with the tracking reference: pose (6) and affine brightness

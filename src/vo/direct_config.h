@@ -17,6 +17,9 @@ struct TrackerConfig {
   /// as under blows and after gaps, those taken by chance mostly less; an unrelated image of little
   /// contrast may have small residuals, but no correlation.
   double min_correlation = 0.55;
+  /// The same for a pose to which the motion so far led: what hides a third of the reference, as a
+  /// lorry that turns does, leaves 0.5.
+  double min_correlation_on_way = 0.3;
   double brightness_prior_a = 100.0;  ///< Weight of a prior on the log-gain to the reference.
   double brightness_prior_b = 0.0;    ///< The same for the bias.
 
@@ -31,6 +34,8 @@ struct TrackerConfig {
     v("max_rmse", max_rmse, "tracking is lost above [grey levels]");
     v("min_inlier_ratio", min_inlier_ratio, "tracking is lost below");
     v("min_correlation", min_correlation, "tracking is lost below");
+    v("min_correlation_on_way", min_correlation_on_way,
+      "the same for a pose to which the motion so far led");
     v("brightness_prior_a", brightness_prior_a, "weight of the prior on the log-gain");
     v("brightness_prior_b", brightness_prior_b, "weight of the prior on the bias");
   }

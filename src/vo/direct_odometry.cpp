@@ -9,6 +9,7 @@
 #include "sovo/vo/epipolar_search.h"
 #include "sovo/vo/keyframe_policy.h"
 #include "sovo/vo/marginalization.h"
+#include "sovo/vo/view_forecast.h"
 
 namespace sovo {
 
@@ -130,6 +131,7 @@ void DirectOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
   has_first_rmse_ = false;
   last_affine_ = {};
   last_tracking_ = {};
+  lasting_share_ = 1.0;
   next_id_ = 0;
   Keyframe& k =
       window_.insert(new_keyframe(next_id_++, frame, T_world_camera, Affine(), config_.window));
@@ -279,13 +281,24 @@ std::vector<KeyframeState> DirectOdometry::window_keyframes() const {
   return states;
 }
 
+/// Of a camera that drives fast, half of the pixels are out of view in the next keyframe: so many
+/// more are selected as left it last time, and those that will leave it are given up.
+std::vector<SelectedPixel> DirectOdometry::select_lasting_pixels() {
+  constexpr double kLeastShare = 0.4;  // bounds what a wrong forecast costs
+  const int wanted = config_.points.immature_points;
+  const int more = static_cast<int>(wanted / std::max(lasting_share_, kLeastShare));
+  std::vector<SelectedPixel> pixels;
+  selector_.select(*window_.newest().pyramid, mask_.empty() ? nullptr : &mask_, more, &pixels);
+  lasting_share_ = ViewForecast(window_).keep_lasting(wanted, &pixels);
+  return pixels;
+}
+
 void DirectOdometry::add_immature_points(const DepthProposer& proposer, const MapTimer& timer) {
   Keyframe& k = window_.newest();
   std::vector<SelectedPixel> pixels;
   {
     const StageTimer t(timer, MapStage::kSelection);
-    selector_.select(*k.pyramid, mask_.empty() ? nullptr : &mask_, config_.points.immature_points,
-                     &pixels);
+    pixels = select_lasting_pixels();
   }
   std::vector<DepthProposal> proposals(pixels.size());
   if (proposer) {

@@ -141,6 +141,7 @@ class DirectOdometry {
   void trace_all(const MonoFrame& frame, const SE3& T_world_camera, const Affine& affine);
   MapResult make_keyframe(const TrackedFrame& tracked, const SE3& T_world_camera,
                           const DepthProposer& proposer, const MapTimer& timer);
+  std::vector<SelectedPixel> select_lasting_pixels();
   void add_immature_points(const DepthProposer& proposer, const MapTimer& timer);
   std::vector<KeyframeState> marginalize(const MapTimer& timer);
   void keep_point(const Point& point, double rho_unit, KeyframePoints* points) const;
@@ -170,6 +171,7 @@ class DirectOdometry {
   // Mapping side.
   Window window_;
   PixelSelector selector_;
+  double lasting_share_ = 1.0;  ///< Of the pixels selected last, in view of the next keyframe.
   PointActivator activator_;
   BundleAdjuster adjuster_;
   std::uint32_t next_id_ = 0;

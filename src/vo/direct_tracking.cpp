@@ -146,8 +146,10 @@ void DirectOdometry::find_motion_hypotheses(const TrackingReference& reference,
 TrackingResult DirectOdometry::track_from_any(const TrackingReference& reference,
                                               const MonoFrame& frame,
                                               std::span<const SE3> hypotheses) {
-  TrackingResult out = tracker_.track(reference, *frame.pyramid, frame.exposure_s, last_affine_,
-                                      hypotheses, last_tracking_);
+  LastTracking last = last_tracking_;
+  if (known_motion_) last.expected = known_motion_->expected;
+  TrackingResult out =
+      tracker_.track(reference, *frame.pyramid, frame.exposure_s, last_affine_, hypotheses, last);
   if (out.good && known_motion_ && !is_reachable(*known_motion_, out.T_current_reference)) {
     out.good = false;
     out.out_of_reach = true;
@@ -162,7 +164,8 @@ TrackingResult DirectOdometry::align(const TrackingReference& reference, const M
       tracker_.rank(reference, *frame.pyramid, frame.exposure_s, last_affine_,
                     knocked_motions(*known_motion_, reference.levels.back().camera), kMotionsKept);
   TrackingResult found = track_from_any(reference, frame, knocked);
-  const bool better = found.good && (!likely.good || found.rmse < likely.rmse);
+  const bool better =
+      likely.good ? found.good && found.rmse < likely.rmse : found.good || found.out_of_reach;
   return better ? found : likely;
 }
 

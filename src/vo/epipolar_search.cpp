@@ -22,6 +22,7 @@ constexpr float kMaxPixelError = 10.0F;
 constexpr float kPixelErrorBase = 0.2F;
 constexpr float kMinDepthRatio = 0.75F;
 constexpr float kMaxDepthRatio = 1.5F;
+constexpr float kMostScale = 3.0F;  // of a pattern that can still be compared
 // [px]; within the border together with the pixels for the gradient.
 constexpr float kMaxPatternOffset = 2.9F;
 
@@ -76,7 +77,10 @@ TraceState find_segment(const ImageF& image, const HostGeometry& g, const PointC
   if (!inside(image, s->u_max, s->v_max)) return TraceState::kOutOfView;
   const float depth_ratio = near_infinity.z();  // z_target / z_host for a far point
   if (p.rho_min > 0.0F && (depth_ratio < kMinDepthRatio || depth_ratio > kMaxDepthRatio)) {
-    return TraceState::kOutOfView;
+    // The pattern of the search is not scaled; the one that the window compares is. What stereo
+    // knows well enough needs no search.
+    const bool comparable = depth_ratio * kMostScale > 1.0F && depth_ratio < kMostScale;
+    return p.from_static_match() && comparable ? TraceState::kSkipped : TraceState::kOutOfView;
   }
   return TraceState::kUntraced;
 }

@@ -243,6 +243,65 @@ TEST(SimSourceTest, BackwardsIsTheMirrorInTime) {
   EXPECT_EQ(forward.original_stamp(motion.first_ns()), motion.first_ns());
 }
 
+TEST(SimSourceTest, ALorryKeepsItsDistanceAndTheWorldIsTheSame) {
+  SimConfig config = quiet(World::kStreet);
+  const StereoRig rig = small_rig(Distortion::kNone);
+  SimSource empty = make_source(config, rig);
+  config.traffic = Traffic::kLorry;
+  SimSource source = make_source(config, rig);
+  const Vec2 ahead(rig.left.cx, rig.left.cy);
+  const Vec2 beside(0.1 * rig.left.width, 0.8 * rig.left.height);
+  const std::int64_t first = source.truth().front().stamp_ns;
+  for (const std::int64_t s : {0, 2, 5}) {
+    const std::int64_t stamp = first + s * 1'000'000'000;
+    const auto seen = source.depth_at(stamp, {ahead, beside});
+    const auto world = empty.depth_at(stamp, {ahead, beside});
+    EXPECT_NEAR(seen[0], 7.0, 0.15) << s << " s";
+    EXPECT_GT(world[0], 20.0F);
+    EXPECT_EQ(seen[1], world[1]);
+  }
+}
+
+TEST(SimSourceTest, CarsComeTowardsTheCameraAndOvertakeIt) {
+  for (const Traffic traffic : {Traffic::kOncoming, Traffic::kOvertaking}) {
+    SimConfig config = quiet(World::kStreet);
+    const StereoRig rig = small_rig(Distortion::kNone);
+    SimSource empty = make_source(config, rig);
+    config.traffic = traffic;
+    SimSource source = make_source(config, rig);
+    const std::int64_t first = source.truth().front().stamp_ns;
+    // Where a car is seen in the lane at the left, from frame to frame.
+    std::vector<double> depths;
+    for (int i = 0; i < 60; ++i) {
+      const std::int64_t stamp = first + 100'000'000LL * i;
+      const ImageF with = source.depth_at(stamp);
+      const ImageF without = empty.depth_at(stamp);
+      double nearest = 1e9;
+      for (int y = 0; y < with.height(); ++y) {
+        for (int x = 0; x < with.width() / 2; ++x) {
+          const double depth = with.at(x, y);
+          if (depth > 0.0 && std::abs(depth - without.at(x, y)) > 0.2) {
+            nearest = std::min(nearest, depth);
+          }
+        }
+      }
+      if (nearest < 60.0) depths.push_back(nearest);
+    }
+    ASSERT_GT(depths.size(), 10U);
+    int nearer = 0;
+    for (std::size_t i = 1; i < depths.size(); ++i) nearer += depths[i] < depths[i - 1] ? 1 : 0;
+    const bool comes = nearer > static_cast<int>(depths.size()) / 2;
+    EXPECT_EQ(comes, traffic == Traffic::kOncoming);
+  }
+}
+
+TEST(SimSourceTest, TrafficIsForTheStreet) {
+  SimConfig config;
+  config.world = World::kLawn;
+  config.traffic = Traffic::kCar;
+  EXPECT_NE(open_sim(config).error().find("in the street only"), std::string::npos);
+}
+
 TEST(SimSourceTest, WrongValuesAreRefusedWithAReason) {
   SimConfig config;
   config.trajectory = "/nowhere/poses.txt";

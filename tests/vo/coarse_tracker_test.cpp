@@ -243,6 +243,32 @@ TEST(CoarseTracker, AsManyInliersAsInTheLastFrameAreAsExpected) {
   EXPECT_TRUE(track({30.0, first.inlier_ratio}).as_expected);
 }
 
+// What hides a third of the reference, a lorry that turns, takes its correlation.
+TEST(CoarseTracker, APoseToWhichTheMotionLedNeedsLessCorrelation) {
+  const SyntheticScene scene(3);
+  const TrackingReference reference = scene_reference(scene);
+  ImageF covered = scene_view(scene, small_camera(), SE3())->level(0);
+  for (int y = 0; y < covered.height(); ++y) {
+    for (int x = 0; x < covered.width() / 3; ++x) {
+      covered.at(x, y) = (x / 30 + y / 30) % 2 == 0 ? 10.0F : 245.0F;
+    }
+  }
+  const ImagePyramidPtr image = pyramid_of(std::move(covered));
+  const auto track = [&](const std::optional<SE3>& expected) {
+    const std::vector<SE3> start = {SE3()};
+    return CoarseTracker(TrackerConfig())
+        .track(reference, *image, 0.0, {}, start, {30.0, 0.95, expected});
+  };
+  const TrackingResult anywhere = track(std::nullopt);
+  ASSERT_LT(anywhere.T_current_reference.log().norm(), 0.01);
+  ASSERT_LT(anywhere.correlation, TrackerConfig().min_correlation);
+  ASSERT_GT(anywhere.correlation, TrackerConfig().min_correlation_on_way);
+  EXPECT_FALSE(anywhere.good);
+  EXPECT_TRUE(track(SE3()).good);
+  EXPECT_FALSE(track(SE3(SO3::exp(Vec3(0, 0.06, 0)), Vec3::Zero())).good);
+  EXPECT_FALSE(track(SE3(SO3(), Vec3(0, 0, 0.1 / reference.mean_rho))).good);
+}
+
 // A small gain takes the reference's contrast away: residuals alone let such an image pass.
 TEST(CoarseTracker, UnrelatedSceneOfSmallResidualsIsLost) {
   const SyntheticScene scene(3);

@@ -145,6 +145,28 @@ TEST_F(PlaneSearch, PointThatLeavesTheImageIsOutOfView) {
   EXPECT_EQ(trace(target_, geometry_, config_, &behind), TraceState::kOutOfView);
 }
 
+TEST_F(PlaneSearch, PointWhoseDepthHalvesIsGivenUpUnlessStereoKnowsIt) {
+  const auto interval_at = [&](int u, int v) {
+    ImmaturePoint p = point_at(u, v);
+    p.rho_min = static_cast<float>(0.95 / kDepth);
+    p.rho_max = static_cast<float>(1.05 / kDepth);
+    return p;
+  };
+  geometry_ = host_geometry(camera_, SE3(SO3(), Vec3(0, 0, -0.5 * kDepth)), {});
+  ImmaturePoint p = interval_at(100, 66);
+  EXPECT_EQ(trace(target_, geometry_, config_, &p), TraceState::kOutOfView);
+  p = interval_at(100, 66);
+  p.static_information = 1e4F;
+  const ImmaturePoint before = p;
+  EXPECT_EQ(trace(target_, geometry_, config_, &p), TraceState::kSkipped);
+  EXPECT_EQ(p.rho_min, before.rho_min);
+  EXPECT_EQ(p.rho_max, before.rho_max);
+  EXPECT_GT(p.interval_px, 0.0F);
+  // Four times as large its pattern is another.
+  geometry_ = host_geometry(camera_, SE3(SO3(), Vec3(0, 0, -0.75 * kDepth)), {});
+  EXPECT_EQ(trace(target_, geometry_, config_, &p), TraceState::kOutOfView);
+}
+
 TEST_F(PlaneSearch, PatternThatIsBlindOrOutsideMakesNoPoint) {
   ImmaturePoint p;
   EXPECT_FALSE(make_immature_point(host_, 2.0F, 60.0F, 1, config_, 50.0, &p));

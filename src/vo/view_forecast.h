@@ -1,0 +1,39 @@
+#pragma once
+
+#include <vector>
+
+#include "sovo/vo/pixel_selector.h"
+#include "sovo/vo/window.h"
+
+namespace sovo {
+
+/// Which pixels of the newest keyframe the next one will still see, when the camera moves on as it
+/// came from the keyframe before. Depths are those of the window's points nearby.
+class ViewForecast {
+ public:
+  /// Everything stays in view of a window of one keyframe.
+  explicit ViewForecast(const Window& window);
+
+  /// True where no depth is known nearby.
+  bool stays(int x, int y) const;
+
+  /// Leaves those that stay, `wanted` at most, evenly taken. Returns the share that stays.
+  double keep_lasting(int wanted, std::vector<SelectedPixel>* pixels) const;
+
+ private:
+  static constexpr int kCell = 32;  ///< Side of what has one depth [px].
+
+  void add(float x, float y, float rho);
+  void add_host(const Keyframe& host, const PairGeometry* to_newest);
+  void fill_gaps();
+
+  int width_;
+  int height_;
+  int cells_x_;
+  int cells_y_;
+  Eigen::Matrix3f KRKi_ = Eigen::Matrix3f::Identity();
+  Eigen::Vector3f Kt_ = Eigen::Vector3f::Zero();
+  std::vector<float> rho_;  ///< Of the farthest point of each cell [1/m]; infinite: of none.
+};
+
+}  // namespace sovo

@@ -13,6 +13,7 @@ constexpr double kDepthStartLambda = 0.1;
 constexpr double kStopStep = 1e-4;                // relative
 constexpr double kMinStaticInformation = 1000.0;  // on log-depth: known to about 15 %
 constexpr int kCandidateBlock = 32;
+constexpr double kComparableSize = 1.5;  // of a pattern, over that in its host
 
 bool is_ready(const ImmaturePoint& p, const PointConfig& config) {
   const bool traced = p.state == TraceState::kGood || p.state == TraceState::kSkipped ||
@@ -170,6 +171,22 @@ void PointActivator::judge(const Window& window, const Candidate& candidate, dou
   }
 }
 
+/// A keyframe that sees the point far larger or smaller than its host does not deny it: on most
+/// surfaces the pattern looks different there.
+PointActivator::Votes PointActivator::count_votes(const Window& window, int host, double rho,
+                                                  const DepthEvaluation& at) {
+  Votes votes;
+  for (int t = 0; t < window.size(); ++t) {
+    if (t == host) continue;
+    const LinearizedResidual& r = at.residuals[static_cast<std::size_t>(t)];
+    if (r.state == ResidualState::kIn) ++votes.agree;
+    const double size = static_cast<double>(r.centre_rho) / rho;
+    const bool comparable = size < kComparableSize && size * kComparableSize > 1.0;
+    if (r.state == ResidualState::kOutlier && comparable) ++votes.deny;
+  }
+  return votes;
+}
+
 void PointActivator::optimize(const Window& window, double mean_rho, Candidate* candidate) const {
   const Keyframe& host = window[candidate->host];
   const ImmaturePoint& immature = host.immature[candidate->index];
@@ -209,21 +226,17 @@ void PointActivator::optimize(const Window& window, double mean_rho, Candidate* 
   }
   p.rho = best_rho;
   p.hessian = now.hessian;
-  int inliers = 0;
-  int outliers = 0;
   for (int t = 0; t < window.size(); ++t) {
     const LinearizedResidual& r = now.residuals[static_cast<std::size_t>(t)];
-    if (t == candidate->host) continue;
-    if (r.state == ResidualState::kOutlier) ++outliers;
-    if (r.state != ResidualState::kIn) continue;
+    if (t == candidate->host || r.state != ResidualState::kIn) continue;
     p.residuals[static_cast<std::size_t>(window[t].slot)] = {ResidualState::kIn, r.raw_energy,
                                                              r.centre_u, r.centre_v, r.centre_rho};
-    ++inliers;
   }
   candidate->discard = true;  // the immature point goes, as an active one or for good
   // What most keyframes deny moves by itself, a car ahead: stereo knows its depth, the map has no
   // place for it.
-  if (inliers == 0 || inliers < outliers) return;
+  const Votes votes = count_votes(window, candidate->host, p.rho, now);
+  if (votes.agree == 0 || votes.agree < votes.deny) return;
   if (!std::isfinite(p.rho) || p.rho <= 0.0) return;
   p.last_state =
       p.residuals[static_cast<std::size_t>(window.newest().slot)].state == ResidualState::kIn

@@ -69,6 +69,12 @@ class PointActivator {
   /// Adds those up that are inliers with the threshold times `slack`.
   static void judge(const Window& window, const Candidate& candidate, double slack,
                     DepthEvaluation* at);
+  /// Keyframes that agree about a point, and that deny it.
+  struct Votes {
+    int agree = 0;
+    int deny = 0;
+  };
+  static Votes count_votes(const Window& window, int host, double rho, const DepthEvaluation& at);
 
   PointConfig config_;
   WindowConfig window_config_;

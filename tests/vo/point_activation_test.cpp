@@ -44,18 +44,23 @@ TEST(OccupancyMap, FindsTakenPixelsAsSearchingAllOfThemDoes) {
   EXPECT_GT(far, 300);
 }
 
-/// Immature points of the first of four keyframes at their true depths; the last ones see another
-/// world where these points are, as they see a car's place when it has driven on.
-int activated_when_denied_by(int keyframes) {
+/// Immature points of the first of four keyframes at their true depths. `forward`: the last ones
+/// stand so far ahead of the host, 0: near it. `deny`: they see another world where these points
+/// are, as they see a car's place when it has driven on.
+int activated(int last_ones, double forward = 0.0, bool deny = true) {
   using namespace test;
   const SyntheticScene scene(3);
   const SyntheticScene elsewhere(11);
   const CameraModel camera = small_camera();
   Window window(camera);
   std::vector<SE3> poses;
-  for (int i = 0; i < 4; ++i) poses.push_back(keyframe_pose(i));
+  const auto is_last = [last_ones](int i) { return i >= 4 - last_ones; };
   for (int i = 0; i < 4; ++i) {
-    const bool other = i >= 4 - keyframes;
+    const bool approached = forward > 0.0 && is_last(i);
+    poses.push_back(approached ? SE3(SO3(), Vec3(0, 0, forward)) : keyframe_pose(i));
+  }
+  for (int i = 0; i < 4; ++i) {
+    const bool other = deny && is_last(i);
     const auto at = poses[static_cast<std::size_t>(i)];
     window.insert(make_keyframe(static_cast<std::uint32_t>(i),
                                 scene_view(other ? elsewhere : scene, camera, at), at));
@@ -78,10 +83,18 @@ int activated_when_denied_by(int keyframes) {
 }
 
 TEST(PointActivator, APointThatMostKeyframesDenyIsNone) {
-  const int all = activated_when_denied_by(0);
+  const int all = activated(0);
   EXPECT_GT(all, 50);
-  EXPECT_GT(activated_when_denied_by(1), 0.9 * all) << "one of three may be hidden";
-  EXPECT_LT(activated_when_denied_by(2), 0.4 * all) << "some fit by chance";
+  EXPECT_GT(activated(1), 0.9 * all) << "one of three may be hidden";
+  EXPECT_LT(activated(2), 0.4 * all) << "some fit by chance";
+}
+
+TEST(PointActivator, KeyframesThatSeeAPointFarLargerDenyNothing) {
+  const double depth = test::SyntheticScene(3).depth(test::small_camera(), SE3(), Vec2(103, 78));
+  const int all = activated(2, 0.6 * depth, false);
+  EXPECT_GT(all, 20) << "the test needs points that stay in view";
+  EXPECT_GT(activated(2, 0.6 * depth), 0.9 * all);
+  EXPECT_LT(activated(2, 0.1 * depth), 0.4 * activated(2, 0.1 * depth, false));
 }
 
 }  // namespace

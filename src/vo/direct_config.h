@@ -74,7 +74,7 @@ struct KeyframeConfig {
 /// Immature points: selection, epipolar tracing, activation.
 struct PointConfig {
   int active_points = 2000;   ///< In the window.
-  int immature_points = 500;  ///< Selected a keyframe.
+  int immature_points = 400;  ///< Selected a keyframe.
   double max_search = 0.027;  ///< Of width + height: longest epipolar search.
   double huber = 9.0;
   double outlier_energy = 144.0;  ///< A pixel of the pattern; grey levels squared.

@@ -284,9 +284,8 @@ std::vector<KeyframeState> DirectOdometry::window_keyframes() const {
 /// Of a camera that drives fast, half of the pixels are out of view in the next keyframe: so many
 /// more are selected as left it last time, and those that will leave it are given up.
 std::vector<SelectedPixel> DirectOdometry::select_lasting_pixels() {
-  constexpr double kLeastShare = 0.4;  // bounds what a wrong forecast costs
   const int wanted = config_.points.immature_points;
-  const int more = static_cast<int>(wanted / std::max(lasting_share_, kLeastShare));
+  const int more = static_cast<int>(wanted / lasting_share_);
   std::vector<SelectedPixel> pixels;
   selector_.select(*window_.newest().pyramid, mask_.empty() ? nullptr : &mask_, more, &pixels);
   lasting_share_ = ViewForecast(window_).keep_lasting(wanted, &pixels);

@@ -68,8 +68,11 @@ void ViewForecast::fill_gaps() {
 }
 
 double ViewForecast::keep_lasting(int wanted, std::vector<SelectedPixel>* pixels) const {
-  const std::size_t all = pixels->size();
-  std::erase_if(*pixels, [this](const SelectedPixel& p) { return !stays(p.x, p.y); });
+  const auto leaves = [this](const SelectedPixel& p) { return !stays(p.x, p.y); };
+  const auto all = static_cast<double>(pixels->size());
+  const auto leaving = std::count_if(pixels->begin(), pixels->end(), leaves);
+  const bool believed = static_cast<double>(leaving) <= (1.0 - kLeastShare) * all;
+  if (believed) std::erase_if(*pixels, leaves);
   const std::size_t staying = pixels->size();
   const auto most = static_cast<std::size_t>(std::max(0, wanted));
   if (staying > most) {
@@ -79,7 +82,7 @@ double ViewForecast::keep_lasting(int wanted, std::vector<SelectedPixel>* pixels
     }
     pixels->resize(kept);
   }
-  return all == 0 ? 1.0 : static_cast<double>(staying) / static_cast<double>(all);
+  return all > 0.0 ? static_cast<double>(staying) / all : 1.0;
 }
 
 bool ViewForecast::stays(int x, int y) const {

@@ -17,7 +17,12 @@ class ViewForecast {
   /// True where no depth is known nearby.
   bool stays(int x, int y) const;
 
-  /// Leaves those that stay, `wanted` at most, evenly taken. Returns the share that stays.
+  /// Least share of the pixels that a forecast leaves: one that leaves fewer is not believed, for
+  /// a camera that was knocked does not go on like that.
+  static constexpr double kLeastShare = 0.4;
+
+  /// Leaves those that stay, or all when they are fewer than kLeastShare, `wanted` at most, evenly
+  /// taken. Returns the share that is believed to stay.
   double keep_lasting(int wanted, std::vector<SelectedPixel>* pixels) const;
 
  private:

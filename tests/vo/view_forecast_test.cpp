@@ -103,6 +103,11 @@ TEST(ViewForecast, KeepsAsManyAsAreWantedEvenly) {
     const auto row = static_cast<std::size_t>(pixels[i].y - 70);
     EXPECT_EQ(row, i / 8) << "eight of each row of twenty";
   }
+  // Of 20 pixels 19 leave the view: that is not believed.
+  std::vector<SelectedPixel> corner(19, {4, 4, 1, 0.0F});
+  corner.push_back({100, 80, 1, 0.0F});
+  EXPECT_DOUBLE_EQ(forecast.keep_lasting(40, &corner), 1.0);
+  EXPECT_EQ(corner.size(), 20U);
   std::vector<SelectedPixel> none;
   EXPECT_DOUBLE_EQ(forecast.keep_lasting(40, &none), 1.0);
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <utility>
 
@@ -60,13 +61,12 @@ class GroundTrack {
     const double yaw = std::atan2(front.y - rear.y, front.x - rear.x);
     const Vec3 middle(0.5 * (rear.x + front.x) - left * std::sin(yaw),
                       0.5 * (rear.y + front.y) + left * std::cos(yaw), 0.0);
-    return SE3(SO3::exp(Vec3(0, 0, towards ? yaw + kHalfTurn : yaw)), middle);
+    return SE3(SO3::exp(Vec3(0, 0, towards ? yaw + std::numbers::pi : yaw)), middle);
   }
 
  private:
   static constexpr double kStep = 1.0;    ///< Between points of the way [m].
   static constexpr double kEnds = 200.0;  ///< Length of its straight ends [m].
-  static constexpr double kHalfTurn = 3.14159265358979323846;
 
   /// The point `length` beyond `b` on the line from `a`.
   static WayPoint beyond(const WayPoint& a, const WayPoint& b, double length) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <vector>
 
 #include "sovo/image/lanes.h"
 
@@ -133,6 +134,7 @@ Undistorter::Undistorter(const CameraModel& raw, const CameraModel& pinhole)
   offset_.assign(size, -1);
   fx_.assign(size, 0.0F);
   fy_.assign(size, 0.0F);
+  std::vector<Vec2> sources(size, Vec2(-1.0, -1.0));
   for (int y = 0; y < height_; ++y) {
     for (int x = 0; x < width_; ++x) {
       const std::size_t i = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + x;
@@ -144,8 +146,10 @@ Undistorter::Undistorter(const CameraModel& raw, const CameraModel& pinhole)
       offset_[i] = iy * raw.width + ix;
       fx_[i] = static_cast<float>(source->x() - ix);
       fy_[i] = static_cast<float>(source->y() - iy);
+      sources[i] = *source;
     }
   }
+  from_bytes_ = ByteRemap::make(width_, height_, raw_width_, raw_height_, sources);
 }
 
 void Undistorter::apply(const ImageF& raw, ImageF* out) const {

@@ -1,7 +1,12 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
 #include "sovo/geometry/camera_model.h"
 #include "sovo/geometry/types.h"
+#include "sovo/image/byte_remap.h"
 #include "sovo/image/image.h"
 
 namespace sovo {
@@ -29,6 +34,13 @@ class Undistorter {
   /// Bilinear resampling; pixels without a source become 0 and are left out by `valid_mask`.
   void apply(const ImageF& raw, ImageF* out) const;
 
+  /// The same from bytes, to 1/256 px and several times as fast, which not all cameras allow.
+  bool takes_bytes() const { return from_bytes_.has_value(); }
+  /// `step` is the distance between rows [bytes]. Precondition: `takes_bytes`.
+  void apply(const std::uint8_t* raw, std::ptrdiff_t step, ImageF* out) const {
+    from_bytes_->apply(raw, step, out);
+  }
+
   /// 255 where the result has a source in the raw image at least one pixel from its edge and
   /// `raw_mask` (may be empty: all allowed) is not zero there; 0 elsewhere.
   ImageU8 valid_mask(const ImageU8& raw_mask) const;
@@ -48,6 +60,7 @@ class Undistorter {
   /// offset is negative where there is no source.
   AlignedVector<std::int32_t> offset_;
   AlignedVector<float> fx_, fy_;  ///< Position between them.
+  std::optional<ByteRemap> from_bytes_;
 };
 
 }  // namespace sovo

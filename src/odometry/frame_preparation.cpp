@@ -93,6 +93,11 @@ std::string FramePreparation::check_side(const SideImage& side, bool is_left) co
   return "";
 }
 
+bool FramePreparation::takes_bytes(const SideImage& left) const {
+  return undistorter_->takes_bytes() && left.format == PixelFormat::kMono8 && downscale_ == 1 &&
+         cameras_.left_photometric.empty();
+}
+
 MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver* observer) {
   MonoFrame out;
   out.stamp_ns = frame.stamp_ns;
@@ -100,7 +105,9 @@ MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver
   auto pyramid = left_pyramids_.take();
   std::optional<ScopedStage> stage(std::in_place, observer, Stage::kUndistortion);
   pyramid->rebuild(max_levels_, [&](ImageF* image) {
-    if (undistorter_) {
+    if (undistorter_ && takes_bytes(frame.left)) {
+      undistorter_->apply(frame.left.data->data(), frame.left.step, image);
+    } else if (undistorter_) {
       to_float(frame.left, cameras_.left_photometric, downscale_, &raw_left_);
       undistorter_->apply(raw_left_, image);
     } else {

@@ -33,6 +33,9 @@ class FramePreparation {
   ImagePyramid prepare_right(const SideImage& right) const;
 
  private:
+  /// Whether the pixels are resampled as they come, with nothing to be done before.
+  bool takes_bytes(const SideImage& left) const;
+
   StereoCameras cameras_;
   int downscale_;
   int max_levels_;

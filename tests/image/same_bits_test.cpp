@@ -62,5 +62,18 @@ TEST(SameBits, PreparationOfAFrame) {
   EXPECT_EQ(sum.value(), 0xd60feb3bcbe56c38U);
 }
 
+TEST(SameBits, BytesUndistorted) {
+  const CameraModel raw = test::make_camera(kWidth, kHeight, 110, 111, 75.3, 51.6,
+                                            Distortion::kRadtan, {-0.28, 0.07, 2e-4, 2e-5});
+  const Undistorter undistorter(raw, test::make_camera(kWidth, kHeight, 100, 100, 75.5, 51.5));
+  ASSERT_TRUE(undistorter.takes_bytes());
+  const SideImage image = raw_image(PixelFormat::kMono8);
+  ImageF undistorted;
+  undistorter.apply(image.data->data(), image.step, &undistorted);
+  test::Checksum sum;
+  sum.add(undistorted);
+  EXPECT_EQ(sum.value(), 11914141268158406607U);
+}
+
 }  // namespace
 }  // namespace sovo

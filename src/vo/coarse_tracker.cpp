@@ -33,7 +33,6 @@ constexpr std::size_t kFavourites = 4;    ///< Motions looked at again for each 
 constexpr double kSamePixels = 0.5;       ///< Motions that end closer on a level are the same.
 constexpr std::size_t kMostAligned = 64;  ///< Of more, those are that explain most as they are.
 constexpr std::size_t kRankPoints = 500;  ///< Of a level: enough to compare motions, of thousands.
-constexpr std::size_t kMotionPoints = 256;  ///< At least: their mean motion decides on keyframes.
 
 /// A motion that moves the points out of view explains nothing.
 double badness(double rmse, int inliers, std::size_t points) {
@@ -345,7 +344,6 @@ TrackingResult CoarseTracker::track(const TrackingReference& reference, const Im
   best.correlation = correlation(reference.levels[0], pyramid.level(0), best.T_current_reference);
   best.good = best.rmse < config_.max_rmse && best.inlier_ratio > config_.min_inlier_ratio &&
               best.correlation > least_correlation(config_, last, best, reference.mean_rho);
-  best.motion = motion_of_points(reference, best.T_current_reference);
   return best;
 }
 
@@ -400,31 +398,6 @@ std::vector<SE3> CoarseTracker::rank(const TrackingReference& reference,
   std::vector<SE3> out;
   for (const Ranked& r : ranked) out.push_back(r.T);
   return out;
-}
-
-PointMotion motion_of_points(const TrackingReference& reference, const SE3& T_current_reference) {
-  const ReferenceLevel& level = reference.levels[0];
-  const std::size_t stride = std::max<std::size_t>(1, level.size() / kMotionPoints);
-  const Mat3 K = level.camera.matrix();
-  const Mat3 KRKi = K * T_current_reference.rotation_matrix() * K.inverse();
-  const Vec3 Kt = K * T_current_reference.translation();
-  PointMotion sum;
-  int n = 0;
-  const auto flow = [](const Vec3& p, const Vec3& from) {
-    const double du = p.x() / p.z() - from.x();
-    const double dv = p.y() / p.z() - from.y();
-    return du * du + dv * dv;
-  };
-  for (std::size_t i = 0; i < level.size(); i += stride) {
-    const Vec3 p(level.u[i], level.v[i], 1.0);
-    const Vec3 kt = Kt * level.rho[i];
-    sum.flow_translation += flow(p + kt, p) + flow(p - kt, p);
-    sum.flow_total += flow(KRKi * p + kt, p) + flow(KRKi * p - kt, p);
-    sum.approach += 2.0 * std::abs(kt.z());
-    n += 2;
-  }
-  if (n == 0) return {};
-  return {std::sqrt(sum.flow_translation / n), std::sqrt(sum.flow_total / n), sum.approach / n};
 }
 
 }  // namespace sovo

@@ -12,16 +12,6 @@
 
 namespace sovo {
 
-/// How a motion moves the points of a reference in the image of level 0.
-struct PointMotion {
-  double flow_translation = 0.0;  ///< RMS flow without the rotation [px].
-  double flow_total = 0.0;        ///< RMS flow [px].
-  double approach = 0.0;  ///< Mean motion along the view, to and fro alike, in the points' depths.
-};
-
-/// That of `T_current_reference` (the flows as in DSO, Sec. 3.1, "keyframe creation").
-PointMotion motion_of_points(const TrackingReference& reference, const SE3& T_current_reference);
-
 /// How a frame was tracked.
 struct TrackingResult {
   bool good = false;
@@ -34,7 +24,6 @@ struct TrackingResult {
   double view_ratio = 0.0;    ///< Reference pixels that are in view.
   double correlation = 0.0;   ///< Of the brightness of reference pixels in view and image, -1..1.
   int inliers = 0;
-  PointMotion motion;               ///< From the reference to this frame.
   Mat6 information = Mat6::Zero();  ///< Of T_current_reference (left perturbation), unit noise.
   int hypothesis = 0;               ///< Which motion hypothesis was taken.
 };

@@ -45,9 +45,10 @@ struct TrackerConfig {
 /// 1120 / (width + height)) and the brightness change exceeds 1, or a smaller sum and a residual
 /// twice the first one's.
 struct KeyframeConfig {
-  double flow_translation = 0.012;
+  double flow_translation = 0.006;
   double flow_total = 0.012;
-  double approach = 3.6;
+  double max_translation_flow = 67.0;
+  double approach = 4.3;
   double brightness = 2.0;
   double rmse_factor = 2.0;
   double rmse_min_score = 0.13;
@@ -60,6 +61,8 @@ struct KeyframeConfig {
   void visit(Visitor& v) {
     v("flow_translation", flow_translation, "weight of the flow without rotation");
     v("flow_total", flow_total, "weight of the flow");
+    v("max_translation_flow", max_translation_flow,
+      "what the translation adds to the flow of a point counts as no more [px of a VGA image]");
     v("approach", approach, "weight of the motion along the view, in depths of the points");
     v("brightness", brightness, "weight of the change of log-gain");
     v("rmse_factor", rmse_factor, "a keyframe is made above this x the first residual");

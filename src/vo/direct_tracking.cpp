@@ -204,8 +204,11 @@ TrackedFrame DirectOdometry::track_hypotheses(const MonoFrame& frame,
   last_tracking_ = {out.tracking.rmse, out.tracking.inlier_ratio};
   last_affine_ = out.tracking.affine;
   out.T_world_camera = ref.T_world_camera * out.tracking.T_current_reference.inverse();
-  out.wants_keyframe =
-      wants_keyframe(config_.keyframe, camera_, ref, out.tracking, frame.exposure_s, first_rmse_);
+  const PointMotion motion =
+      motion_of_points(ref, out.tracking.T_current_reference,
+                       config_.keyframe.max_translation_flow * pixels_for_one_of_vga(camera_));
+  out.wants_keyframe = wants_keyframe(config_.keyframe, camera_, ref, out.tracking, motion,
+                                      frame.exposure_s, first_rmse_);
   past_.push_back(
       {out.tracking.T_current_reference, ref.log_scale, ref.keyframe_id, frame.stamp_ns});
   if (past_.size() > 2) past_.erase(past_.begin());

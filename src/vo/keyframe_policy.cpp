@@ -7,8 +7,7 @@ namespace sovo {
 
 namespace {
 
-constexpr double kFlowUnit = 1120.0;  // width + height of a VGA image, where the weights were tuned
-constexpr int kManyGood = 14;         // good residuals on record of a long-seen point
+constexpr int kManyGood = 14;  // good residuals on record of a long-seen point
 constexpr int kFewLeft = 3;
 
 /// Sum over the other keyframes of 1 / distance, times the root of the distance to the newest;
@@ -35,15 +34,19 @@ bool should_leave(const Window& window, const Point& p, int residuals, int survi
 
 }  // namespace
 
+double pixels_for_one_of_vga(const CameraModel& camera) {
+  return (camera.width + camera.height) / (640.0 + 480.0);
+}
+
 bool wants_keyframe(const KeyframeConfig& config, const CameraModel& camera,
                     const TrackingReference& reference, const TrackingResult& tracked,
-                    double exposure_s, double first_rmse) {
-  const double unit = kFlowUnit / (camera.width + camera.height);
+                    const PointMotion& motion, double exposure_s, double first_rmse) {
+  const double unit = 1.0 / pixels_for_one_of_vga(camera);
   const BrightnessTransfer transfer =
       brightness_transfer(reference.affine, reference.exposure_s, tracked.affine, exposure_s);
-  const double score = config.flow_translation * unit * tracked.motion.flow_translation +
-                       config.flow_total * unit * tracked.motion.flow_total +
-                       config.approach * tracked.motion.approach +
+  const double score = config.flow_translation * unit * motion.flow_translation +
+                       config.flow_total * unit * motion.flow_total +
+                       config.approach * motion.approach +
                        config.brightness * std::abs(std::log(transfer.gain));
   // The residual of a camera at rest is noise, and twice of it nothing that a keyframe would mend:
   // without parallax the window's scale would be left to that noise.

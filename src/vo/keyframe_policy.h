@@ -5,15 +5,20 @@
 #include "sovo/vo/coarse_tracker.h"
 #include "sovo/vo/direct_config.h"
 #include "sovo/vo/photometric_problem.h"
+#include "sovo/vo/point_motion.h"
 #include "sovo/vo/window.h"
 
 namespace sovo {
 
-/// Whether a tracked frame should become a keyframe. `first_rmse`: of the first frame tracked
-/// against this reference.
+/// Pixels of `camera` for one of a VGA image, in which the flows of `KeyframeConfig` are given.
+double pixels_for_one_of_vga(const CameraModel& camera);
+
+/// Whether a tracked frame should become a keyframe. `motion`: of the reference's points, flows
+/// clipped at `config.max_translation_flow`. `first_rmse`: of the first frame tracked against this
+/// reference.
 bool wants_keyframe(const KeyframeConfig& config, const CameraModel& camera,
                     const TrackingReference& reference, const TrackingResult& tracked,
-                    double exposure_s, double first_rmse);
+                    const PointMotion& motion, double exposure_s, double first_rmse);
 
 /// Marks the keyframes that are to leave the window when a new one enters: those with few points
 /// left or another brightness, then the one that keeps the others best distributed (DSO, Sec. 3.1,

@@ -333,24 +333,5 @@ TEST(TrackingReference, HoldsDepthsAtEveryLevelAndScales) {
   EXPECT_DOUBLE_EQ(twice.log_scale, std::log(2.0));
 }
 
-TEST(MotionOfPoints, IsThatOfAKnownMotion) {
-  const SyntheticScene scene(3);
-  TrackingReference reference = scene_reference(scene);
-  for (float& rho : reference.levels[0].rho) rho = 0.25F;
-  const PointMotion aside = motion_of_points(reference, SE3(SO3(), Vec3(0.1, 0, 0)));
-  const double flow = small_camera().fx * 0.1 * 0.25;
-  EXPECT_NEAR(aside.flow_translation, flow, 1e-6);
-  EXPECT_NEAR(aside.flow_total, flow, 1e-6);
-  EXPECT_NEAR(aside.approach, 0.0, 1e-12);
-  const PointMotion turn =
-      motion_of_points(reference, SE3(SO3::exp(Vec3(0, 0, 0.1)), Vec3::Zero()));
-  EXPECT_NEAR(turn.flow_translation, 0.0, 1e-9);
-  EXPECT_GT(turn.flow_total, 2.0);
-  EXPECT_NEAR(turn.approach, 0.0, 1e-12);
-  for (const double z : {-0.2, 0.2}) {
-    EXPECT_NEAR(motion_of_points(reference, SE3(SO3(), Vec3(0, 0, z))).approach, 0.05, 1e-9);
-  }
-}
-
 }  // namespace
 }  // namespace sovo

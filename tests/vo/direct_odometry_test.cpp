@@ -106,7 +106,7 @@ TEST_F(Map, AnyLeapIsTakenWhereNoLimitIsKnown) {
 
 /// Poses of a drive: forward and to the side, turning a little.
 SE3 drive(int i) {
-  const double s = 0.025 * i;
+  const double s = 0.035 * i;
   return {SO3::exp(Vec3(0.01 * std::sin(3 * s), -0.03 * s, 0.0)),
           Vec3(1.1 * s, 0.05 * std::sin(4 * s), 0.5 * s)};
 }
@@ -127,6 +127,7 @@ TEST_F(Map, GrowsAlongADriveAndKeepsItsScaleInEverySimilarity) {
     keyframes += result.is_keyframe ? 1 : 0;
     if (i == 12 || i == 18) {
       const double factor = i == 12 ? 1.4 : 0.6;
+      ASSERT_TRUE(vo_.snapshot());
       ScaleCorrection correction;
       correction.keyframe_id = vo_.snapshot()->id;
       correction.scale_epoch = vo_.snapshot()->scale_epoch;

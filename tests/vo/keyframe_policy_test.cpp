@@ -18,26 +18,26 @@ class KeyframeDecision : public ::testing::Test {
   bool wanted(double flow_px, double rmse_ratio, double log_gain = 0.0,
               double approach = 0.0) const {
     TrackingResult tracked;
-    tracked.motion = {flow_px, flow_px, approach};
     tracked.rmse = rmse_ratio;
     tracked.affine.a = log_gain;
-    return wants_keyframe(KeyframeConfig(), camera_, TrackingReference(), tracked, 0.0, 1.0);
+    return wants_keyframe(KeyframeConfig(), camera_, TrackingReference(), tracked,
+                          {flow_px, flow_px, approach}, 0.0, 1.0);
   }
 
   CameraModel camera_;
 };
 
 TEST_F(KeyframeDecision, FlowOrBrightnessAloneSuffices) {
-  EXPECT_FALSE(wanted(40.0, 1.0));
-  EXPECT_TRUE(wanted(43.0, 1.0));
+  EXPECT_FALSE(wanted(54.0, 1.0));
+  EXPECT_TRUE(wanted(57.0, 1.0));
   EXPECT_FALSE(wanted(0.0, 1.0, 0.49));
   EXPECT_TRUE(wanted(0.0, 1.0, 0.51));
   EXPECT_TRUE(wanted(0.0, 1.0, -0.51));
 }
 
 TEST_F(KeyframeDecision, MotionAlongTheViewSufficesWhereItMakesLittleFlow) {
-  EXPECT_FALSE(wanted(5.0, 1.0, 0.0, 0.23));
-  EXPECT_TRUE(wanted(5.0, 1.0, 0.0, 0.26));
+  EXPECT_FALSE(wanted(5.0, 1.0, 0.0, 0.20));
+  EXPECT_TRUE(wanted(5.0, 1.0, 0.0, 0.22));
 }
 
 TEST_F(KeyframeDecision, ABadFitMakesOneWhereThereIsParallax) {

@@ -37,7 +37,7 @@ void undistort(benchmark::State& state, bool from_bytes) {
   ImageF floats;
   ImageF out;
   std::size_t next = 0;
-  for (auto _ : state) {
+  for ([[maybe_unused]] const auto _ : state) {
     const SideImage& frame = raw[next++ % kFrames];
     if (from_bytes) {
       undistorter.apply(frame.data->data(), frame.step, &out);

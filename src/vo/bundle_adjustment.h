@@ -19,12 +19,19 @@ struct FramePrior {
 /// Prior of a keyframe: the first of a map holds the gauge, each holds its brightness near zero.
 FramePrior frame_prior(const Keyframe& keyframe, const WindowConfig& config);
 
-/// What a pose's covariance for residuals of unit noise is to be multiplied with [grey levels
-/// squared], from their RMS: neighbouring pixels, and a point's keyframes, err alike, so that eight
-/// residuals count as one.
-inline double independent_variance(double rmse) {
-  constexpr double kCorrelatedResiduals = 8.0;
-  return kCorrelatedResiduals * std::max(rmse * rmse, 1.0);
+/// What a keyframe's covariance for residuals of unit noise is to be multiplied with [grey levels
+/// squared], from their RMS and `PhotometricProblem::gradient_scatter`: neighbouring pixels err
+/// alike, as measured, and so do a point's keyframes, which share its host's pixels.
+inline double keyframe_variance(double rmse, double gradient_scatter) {
+  constexpr double kSharedHost = 8.0;
+  constexpr double kLeastScatter = 0.3;
+  return kSharedHost * std::max(gradient_scatter, kLeastScatter) * std::max(rmse * rmse, 1.0);
+}
+
+/// The same of a frame's alignment, whose finest levels look at one pixel of each point.
+inline double frame_variance(double rmse) {
+  constexpr double kSharedReference = 2.0;
+  return kSharedReference * std::max(rmse * rmse, 1.0);
 }
 
 struct BundleResult {

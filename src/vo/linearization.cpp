@@ -160,6 +160,11 @@ bool is_textured(const LinearizedResidual& residual) {
   return residual.gram[tri(0, 0)] + residual.gram[tri(1, 1)] >= kMinGradientEnergy;
 }
 
+ShiftPart shift_part(const LinearizedResidual& r) {
+  return {r.gram_r[0] * r.gram_r[0] + r.gram_r[1] * r.gram_r[1],
+          r.gram[tri(0, 0)] + r.gram[tri(1, 1)]};
+}
+
 DepthPart depth_part(const LinearizedResidual& r) {
   const auto& m = r.gram;
   return {r.du_rho * (m[tri(0, 0)] * r.du_rho + 2.0F * m[tri(0, 1)] * r.dv_rho) +

@@ -74,6 +74,14 @@ struct DepthPart {
 };
 DepthPart depth_part(const LinearizedResidual& residual);
 
+/// Part of a residual in a shift of its pattern in the target image, whatever moves it: the squared
+/// length of its gradient, sum w (gx, gy) r, and the trace of its Hessian, sum w (gx, gy)^T (gx,
+/// gy).
+struct ShiftPart {
+  float squared_gradient = 0.0F, hessian = 0.0F;
+};
+ShiftPart shift_part(const LinearizedResidual& residual);
+
 /// How a pattern has moved since it was sampled, to first order: its centre in the target image
 /// [px], and the relative log-gain a and bias b [grey levels] of its keyframes.
 struct PatternShift {

@@ -292,6 +292,28 @@ void PhotometricProblem::step_depths(const WindowLinearization& at, const VecX& 
   }
 }
 
+double PhotometricProblem::gradient_scatter(const WindowLinearization& at, int target) const {
+  double squared_gradients = 0.0;
+  double hessians = 0.0;
+  double energy = 0.0;
+  double count = 0.0;
+  for (std::size_t i = 0; i < at.residuals.size(); ++i) {
+    const StoredResidual& stored = at.residuals[i];
+    if (stored.target != target || stored.state != ResidualState::kIn) continue;
+    if (sampled_[i].linearization < 0) continue;
+    const ShiftPart part = shift_part(sampled_[i].linearized);
+    squared_gradients += static_cast<double>(part.squared_gradient);
+    hessians += static_cast<double>(part.hessian);
+    energy += static_cast<double>(sampled_[i].linearized.rr);
+    count += 1.0;
+  }
+  if (energy * hessians <= 0.0) return 1.0;
+  // Of independent errors with variance s^2 the expected square of a gradient is s^2 times the
+  // trace of its Hessian.
+  const double variance = energy / (kPatternSize * count);
+  return squared_gradients / (variance * hessians);
+}
+
 void PhotometricProblem::write_back(const WindowLinearization& from) {
   for (std::size_t i = 0; i < points_.size(); ++i) {
     Point& p = *points_[i].point;

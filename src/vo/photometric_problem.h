@@ -103,6 +103,12 @@ class PhotometricProblem {
   /// Writes states, projections and information into the points.
   void write_back(const WindowLinearization& from);
 
+  /// How many times as much the energy's gradients by the shift of a whole pattern scatter as they
+  /// would if its pixels erred independently: 1 for noise, up to 8 for what moves a whole pattern;
+  /// below 1 where errors of neighbours cancel. Of inliers in keyframe `target`; 1 when there are
+  /// none. `at`: as linearized last.
+  double gradient_scatter(const WindowLinearization& at, int target) const;
+
   const std::vector<PointRef>& points() const { return points_; }
 
  private:

@@ -14,8 +14,10 @@ namespace {
 /// Of a position in a block, kept in 16 bits: a whole number and a fraction.
 constexpr int kFractionBits = 8;
 constexpr int kOne = 1 << kFractionBits;
-/// A block takes mostly no more rows, and always these when all its pixels come from somewhere.
+/// Most blocks need no more rows; these three are read for each of them, needed or not.
 constexpr int kUsualRows = 3;
+/// Rows below that are asked for ahead: a frame that a camera has just delivered is in no cache.
+constexpr int kRowsAhead = 6;
 constexpr int kMostRows = 64;
 /// In a row that no block has.
 constexpr std::uint16_t kNoSource = 255 * kOne;
@@ -121,7 +123,7 @@ struct RemapBlocks {
         const Shorts row = at_y >> kFractionBits;
         const Shorts share = at_y & shorts_of(kOne - 1);
         const std::uint8_t* window = raw + block->top * step + block->left;
-        __builtin_prefetch(window + 6 * step);
+        __builtin_prefetch(window + kRowsAhead * step);
         const RowPair rows = block->usual ? usual_rows(window, step, taps, row)
                                           : many_rows(window, step, block->rows, taps, row);
         float* to = out + std::min(x, width - ByteRemap::kBlock);

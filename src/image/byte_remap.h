@@ -14,7 +14,7 @@ namespace sovo {
 
 /// Bilinear resampling of an image of bytes, straight to floats. Eight neighbours of the result
 /// mostly come from a few short rows of the raw image, so these are read as a whole and sorted in
-/// registers, which costs a third of eight pixels looked up one by one.
+/// registers, instead of eight pixels being looked up one by one in an image of floats.
 class ByteRemap {
  public:
   /// A table for images of `width` x `height` from raw ones of `raw_width` x `raw_height`, of where

@@ -34,7 +34,7 @@ class Undistorter {
   /// Bilinear resampling; pixels without a source become 0 and are left out by `valid_mask`.
   void apply(const ImageF& raw, ImageF* out) const;
 
-  /// The same from bytes, to 1/256 px and several times as fast, which not all cameras allow.
+  /// The same from bytes, to 1/256 px and in half the time, which not all cameras allow.
   bool takes_bytes() const { return from_bytes_.has_value(); }
   /// `step` is the distance between rows [bytes]. Precondition: `takes_bytes`.
   void apply(const std::uint8_t* raw, std::ptrdiff_t step, ImageF* out) const {

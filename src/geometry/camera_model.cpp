@@ -20,13 +20,15 @@ inline Distorted distort_radtan(const std::array<double, 8>& d, const Vec2& m) {
   const double k1 = d[0], k2 = d[1], p1 = d[2], p2 = d[3], k3 = d[4], k4 = d[5], k5 = d[6],
                k6 = d[7];
   const double r2 = x * x + y * y;
-  const double num = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-  const double den = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6));
-  const double num_d = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);
-  const double den_d = k4 + r2 * (2.0 * k5 + r2 * 3.0 * k6);
-  const double inverse = 1.0 / den;
-  const double g = num * inverse;
-  const double g_d = (num_d - g * den_d) * inverse;  // dg / d(r^2)
+  double den = 1.0;
+  double g = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+  double g_d = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);  // dg / d(r^2)
+  if (k4 != 0.0 || k5 != 0.0 || k6 != 0.0) {          // few have them, and a division takes long
+    den = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6));
+    const double den_d = k4 + r2 * (2.0 * k5 + r2 * 3.0 * k6);
+    g /= den;
+    g_d = (g_d - g * den_d) / den;
+  }
 
   Distorted out;
   out.point = {x * g + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),

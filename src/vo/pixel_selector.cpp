@@ -65,6 +65,18 @@ float median_of(const GradientHistogram& histogram) {
   return 0.0F;
 }
 
+/// Rows that are asked for before they are read: an image of a megabyte is in no cache near by.
+constexpr int kRowsAhead = 4;
+
+void prefetch_row(const ImageF& image, int y) {
+  constexpr std::size_t kLineFloats = 16;
+  if (y >= image.height()) return;
+  const float* row = image.row(y);
+  for (std::size_t x = 0; x < static_cast<std::size_t>(image.width()); x += kLineFloats) {
+    __builtin_prefetch(row + x);
+  }
+}
+
 int region_begin(int region, int num_regions, int size) { return region * size / num_regions; }
 
 int ceil_div(int a, int b) { return (a + b - 1) / b; }
@@ -155,6 +167,8 @@ void PixelSelector::compute_medians(const ImageF& image) {
     histograms_.assign(static_cast<std::size_t>(regions_x_), {});
     const int y1 = std::min(h - 1, region_begin(ry + 1, regions_y_, h));
     for (int y = std::max(1, region_begin(ry, regions_y_, h)); y < y1; y += 2) {
+      prefetch_row(image, y + kRowsAhead);
+      prefetch_row(image, y + kRowsAhead + 1);
       run_kernel<GradientSteps>(image.row(y), std::ptrdiff_t{w}, 1, w - 1, gradient_row_.data());
       for (int rx = 0; rx < regions_x_; ++rx) {
         auto& histogram = histograms_[static_cast<std::size_t>(rx)];
@@ -330,10 +344,14 @@ void PixelSelector::fill_thresholds(int level, int region_row, int width, int fu
 void PixelSelector::score_row(const ImageF& image, int level, int y, int first_x, int last_x) {
   if (masked_) {
     const std::uint8_t* allowed = allowed_.row(y << level);
-    for (int x = first_x; x < last_x; ++x) {
-      allowed_row_[static_cast<std::size_t>(x)] = allowed[x << level] != 0 ? 1.0F : 0.0F;
+    float* row = allowed_row_.data();
+    if (level == 0) {  // most of the work, and apart it is done in lanes
+      for (int x = first_x; x < last_x; ++x) row[x] = allowed[x] != 0 ? 1.0F : 0.0F;
+    } else {
+      for (int x = first_x; x < last_x; ++x) row[x] = allowed[x << level] != 0 ? 1.0F : 0.0F;
     }
   }
+  prefetch_row(image, y + kRowsAhead);
   const ScoreInput in = {.row = image.row(y),
                          .above = image.row(y - 1),
                          .below = image.row(y + 1),

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <random>
 #include <utility>
+#include <vector>
 
 #include "vo/window_test_support.h"
 
@@ -44,6 +46,27 @@ TEST(OccupancyMap, FindsTakenPixelsAsSearchingAllOfThemDoes) {
   EXPECT_GT(far, 300);
 }
 
+/// `points` of the host, to be looked for where their inverse depth is `factor` times as large.
+void add_immature(const std::vector<Point>& points, double factor, Keyframe* host) {
+  for (const Point& known : points) {
+    ImmaturePoint p;
+    if (!make_immature_point(host->image(), known.u, known.v, 1, PointConfig(),
+                             WindowConfig().gradient_constant, &p)) {
+      continue;
+    }
+    p.rho_min = p.rho_max = static_cast<float>(factor * known.rho);
+    p.interval_px = 1.0F;
+    p.state = TraceState::kGood;
+    host->immature.push_back(p);
+  }
+}
+
+int activate(Window* window) {
+  window->update_geometry();
+  WorkerPool pool(1);
+  return PointActivator(PointConfig(), WindowConfig(), &pool).activate(window);
+}
+
 /// Immature points of the first of four keyframes at their true depths. `forward`: the last ones
 /// stand so far ahead of the host, 0: near it. `deny`: they see another world where these points
 /// are, as they see a car's place when it has driven on.
@@ -65,21 +88,41 @@ int activated(int last_ones, double forward = 0.0, bool deny = true) {
     window.insert(make_keyframe(static_cast<std::uint32_t>(i),
                                 scene_view(other ? elsewhere : scene, camera, at), at));
   }
-  Keyframe& host = window[0];
-  for (const Point& known : scene_points(scene, camera, host.image(), poses, 0, 9)) {
-    ImmaturePoint p;
-    if (!make_immature_point(host.image(), known.u, known.v, 1, PointConfig(),
-                             WindowConfig().gradient_constant, &p)) {
-      continue;
-    }
-    p.rho_min = p.rho_max = static_cast<float>(known.rho);
-    p.interval_px = 1.0F;
-    p.state = TraceState::kGood;
-    host.immature.push_back(p);
+  add_immature(scene_points(scene, camera, window[0].image(), poses, 0, 9), 1.0, &window[0]);
+  return activate(&window);
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+TEST(PointActivator, FindsDepthsToFractionsOfAPixel) {
+  using namespace test;
+  const SyntheticScene scene(3);
+  const CameraModel camera = small_camera();
+  Window window(camera);
+  std::vector<SE3> poses;
+  for (int i = 0; i < 4; ++i) {
+    poses.push_back(keyframe_pose(i));
+    window.insert(make_keyframe(static_cast<std::uint32_t>(i),
+                                scene_view(scene, camera, poses.back()), poses.back()));
   }
-  window.update_geometry();
-  WorkerPool pool(1);
-  return PointActivator(PointConfig(), WindowConfig(), &pool).activate(&window);
+  const std::vector<Point> points = scene_points(scene, camera, window[0].image(), poses, 0, 5);
+  constexpr double kFactor = 1.05;
+  add_immature(points, kFactor, &window[0]);
+  ASSERT_GT(activate(&window), 50);
+  const double baseline = (poses[3].translation() - poses[0].translation()).norm();
+  std::vector<double> before;
+  std::vector<double> after;
+  for (const Point& p : window[0].points) {
+    const double truth = 1.0 / scene.depth(camera, poses[0], Vec2(p.u, p.v));
+    before.push_back(camera.fx * baseline * truth * (kFactor - 1.0));
+    after.push_back(camera.fx * baseline * std::abs(p.rho - truth));
+  }
+  EXPECT_GT(median(before), 0.5) << "[px] in the farthest keyframe";
+  EXPECT_LT(median(after), 0.1);
 }
 
 TEST(PointActivator, APointThatMostKeyframesDenyIsNone) {

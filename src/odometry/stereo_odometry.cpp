@@ -156,7 +156,8 @@ class StereoOdometry::Impl {
   /// Covariance of (translation, rotation) of the pose in odom axes, from this frame's alignment.
   static Mat6 covariance_of(const TrackedFrame& tracked) {
     const TrackingResult& t = tracked.tracking;
-    const Mat6 information = t.information / frame_variance(t.rmse) + 1e-6 * Mat6::Identity();
+    const double variance = frame_variance(t.rmse, tracked.reference->gradient_scatter);
+    const Mat6 information = t.information / variance + 1e-6 * Mat6::Identity();
     return rotated(tracked.T_world_camera.rotation(), information.inverse());
   }
 

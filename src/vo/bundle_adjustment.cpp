@@ -295,9 +295,9 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   result.points = static_cast<int>(problem.points().size());
   result.rmse = std::sqrt(energy / std::max(1, kPatternSize * result.residuals));
   result.finite = std::isfinite(result.rmse);
-  const double scatter = problem.gradient_scatter(now, static_cast<int>(newest));
+  result.gradient_scatter = problem.gradient_scatter(now, static_cast<int>(newest));
   result.newest_covariance =
-      keyframe_variance(result.rmse, scatter) * newest_covariance(*window, solved);
+      keyframe_variance(result.rmse, result.gradient_scatter) * newest_covariance(*window, solved);
   drop_bad_residuals(window);
   return result;
 }

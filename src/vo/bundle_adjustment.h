@@ -19,19 +19,21 @@ struct FramePrior {
 /// Prior of a keyframe: the first of a map holds the gauge, each holds its brightness near zero.
 FramePrior frame_prior(const Keyframe& keyframe, const WindowConfig& config);
 
+/// Less scatter of gradients is not believed.
+inline constexpr double kLeastScatter = 0.3;
+
 /// What a keyframe's covariance for residuals of unit noise is to be multiplied with [grey levels
 /// squared], from their RMS and `PhotometricProblem::gradient_scatter`: neighbouring pixels err
 /// alike, as measured, and so do a point's keyframes, which share its host's pixels.
 inline double keyframe_variance(double rmse, double gradient_scatter) {
   constexpr double kSharedHost = 8.0;
-  constexpr double kLeastScatter = 0.3;
   return kSharedHost * std::max(gradient_scatter, kLeastScatter) * std::max(rmse * rmse, 1.0);
 }
 
 /// The same of a frame's alignment, whose finest levels look at one pixel of each point.
-inline double frame_variance(double rmse) {
-  constexpr double kSharedReference = 2.0;
-  return kSharedReference * std::max(rmse * rmse, 1.0);
+inline double frame_variance(double rmse, double gradient_scatter) {
+  constexpr double kSharedReference = 3.0;
+  return kSharedReference * std::max(gradient_scatter, kLeastScatter) * std::max(rmse * rmse, 1.0);
 }
 
 struct BundleResult {
@@ -44,6 +46,7 @@ struct BundleResult {
   /// perturbation of T_newest_before: translation [the window's unit], rotation [rad]), the
   /// window's scale held. Of two keyframes or more.
   Mat6 newest_covariance = Mat6::Zero();
+  double gradient_scatter = 1.0;  ///< Of the residuals into the newest keyframe.
 };
 
 /// Photometric bundle adjustment over the sliding window by Levenberg-Marquardt: poses,

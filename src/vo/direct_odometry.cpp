@@ -127,6 +127,7 @@ void DirectOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
   marginalized_.clear();
   snapshot_.reset();
   covariance_.setZero();
+  gradient_scatter_ = 1.0;
   past_.clear();
   has_first_rmse_ = false;
   last_affine_ = {};
@@ -216,6 +217,7 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
   if (result.failed) return result;
 
   extend_covariance(result.bundle.newest_covariance);
+  gradient_scatter_ = result.bundle.gradient_scatter;
   for (int h = 0; h < window_.size(); ++h) {
     for (Point& p : window_[h].points) {
       p.remove = h + 1 < window_.size() && p.count(ResidualState::kIn) == 0;
@@ -343,6 +345,7 @@ void DirectOdometry::publish_reference() {
   auto next = std::make_shared<TrackingReference>(build_tracking_reference(window_, num_levels_));
   next->log_scale = log_scale_;
   next->covariance = covariance_;
+  next->gradient_scatter = gradient_scatter_;
   const std::lock_guard lock(reference_mutex_);
   reference_ = std::move(next);
 }

@@ -182,6 +182,7 @@ class DirectOdometry {
   KeyframePoses keyframes_;
   /// Of the newest keyframe's pose since the map began, as in `TrackingReference`.
   Mat6 covariance_ = Mat6::Zero();
+  double gradient_scatter_ = 1.0;                         ///< Of the last bundle adjustment.
   std::map<std::uint32_t, KeyframePoints> marginalized_;  ///< By the window's keyframes.
 
   // Shared: the reference.

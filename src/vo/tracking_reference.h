@@ -28,6 +28,8 @@ struct TrackingReference {
   /// Of that pose, since the map began: (translation, rotation) in world axes, carried to the
   /// origin (geometry/pose_covariance.h). Without what errors of scale add.
   Mat6 covariance = Mat6::Zero();
+  /// Of the last bundle adjustment: `PhotometricProblem::gradient_scatter`.
+  double gradient_scatter = 1.0;
   double mean_rho = 1.0;  ///< Mean inverse depth of the level-0 points [1/m].
   std::vector<ReferenceLevel> levels;
   std::size_t num_window_points = 0;  ///< Points that were splatted.

@@ -157,6 +157,8 @@ TEST_F(Map, CovarianceIsCarriedOverEachStepAndGrowsByIt) {
     const SE3 newest = vo_.reference()->T_world_camera;
     const Mat6 step = rotated(newest.rotation(), result.bundle.newest_covariance);
     EXPECT_GT(step.diagonal().minCoeff(), 0.0);
+    EXPECT_NE(result.bundle.gradient_scatter, 1.0) << "measured";
+    EXPECT_EQ(vo_.reference()->gradient_scatter, result.bundle.gradient_scatter);
     const Mat6 expected = carried(before, newest.translation() - position) + step;
     before = carried(vo_.reference()->covariance, newest.translation());
     position = newest.translation();

@@ -237,7 +237,7 @@ StaticMatch StaticMatcher::match(const ImagePyramid& left, const ImagePyramid& r
   const auto gradient = gradient_along(search, 0.5 * (visible->range.min + visible->range.max));
   if (!gradient) return out;
   out.state = MatchState::kNoTexture;
-  if (*gradient < config_.min_gradient) return out;
+  if (*gradient < static_cast<double>(request.gradient_share) * config_.min_gradient) return out;
 
   out.state = MatchState::kOutOfView;
   const int coarsest =

@@ -57,6 +57,8 @@ struct MatchRequest {
   /// [min, max] where something is known; a negative range looks behind infinity, where matches
   /// mean swapped cameras [1/m].
   std::optional<std::pair<float, float>> inverse_depth_range = {};
+  /// Part of `min_gradient` that is asked of the patch: less where the image has little texture.
+  float gradient_share = 1.0F;
   bool across = false;  ///< Whether the displacement across the curve is wanted, at twice the cost.
 };
 

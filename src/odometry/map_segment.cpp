@@ -213,12 +213,14 @@ std::vector<StaticMatch> MapSegment::match_all(const ImagePyramid& left, const I
                                                const std::vector<SelectedPixel>& pixels) const {
   const ScopedStage stage(observer_, Stage::kStaticMatching);
   std::vector<StaticMatch> matches(pixels.size());
-  const auto match_some = [&](const std::vector<std::size_t>& which, const MatchRequest& request) {
+  const auto match_some = [&](const std::vector<std::size_t>& which, const MatchRequest& common) {
     const std::size_t blocks = (which.size() + kMatchBlock - 1) / kMatchBlock;
     pool_->run(static_cast<int>(blocks), [&](int block) {
       const std::size_t begin = static_cast<std::size_t>(block) * kMatchBlock;
       for (std::size_t i = begin; i < std::min(which.size(), begin + kMatchBlock); ++i) {
         const SelectedPixel& pixel = pixels[which[i]];
+        MatchRequest request = common;
+        request.gradient_share = pixel.threshold_share;
         matches[which[i]] = matcher_.match(left, right, pixel.x, pixel.y, request);
       }
     });

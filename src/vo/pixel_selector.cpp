@@ -12,6 +12,11 @@ namespace {
 
 constexpr int kNumDirections = 16;
 constexpr int kMaxBlock = 64;
+// Smaller blocks hold no choice of pixels, larger ones plenty.
+constexpr int kSmallBlock = 2;
+constexpr int kLargeBlock = 10;
+constexpr double kLower = 0.6;  ///< Steps of the threshold's offset.
+constexpr double kRaise = 1.2;
 
 struct Directions {
   std::array<float, kNumDirections> x{}, y{};
@@ -123,6 +128,7 @@ PixelSelector::PixelSelector(const PixelSelectorConfig& config) : config_(config
 void PixelSelector::reset() {
   random_state_ = static_cast<std::uint64_t>(config_.seed);
   block_ = std::clamp(config_.initial_block, 1, kMaxBlock);
+  threshold_share_ = 1.0;
 }
 
 /// SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators"), upper half.
@@ -144,8 +150,17 @@ void PixelSelector::select(const ImagePyramid& pyramid, const ImageU8* mask, int
   masked_ = mask != nullptr && !mask->empty();
   if (masked_) erode_mask(*mask);
   allowed_row_.assign(static_cast<std::size_t>(image.width()), 1.0F);
-  compute_thresholds(image);
+  compute_medians(image);
+  do {
+    compute_thresholds();
+    select_enough(pyramid, wanted, out);
+  } while (lower_threshold(*out, wanted));
+  raise_threshold();
+  if (out->size() > static_cast<std::size_t>(wanted)) thin(wanted, out);
+}
 
+void PixelSelector::select_enough(const ImagePyramid& pyramid, int wanted,
+                                  std::vector<SelectedPixel>* out) {
   for (int attempt = 0; attempt < 2; ++attempt) {
     select_all_levels(pyramid, out);
     // n = K / d^2 pixels from blocks of side d, solved for the largest d that gives enough.
@@ -155,13 +170,31 @@ void PixelSelector::select(const ImagePyramid& pyramid, const ImageU8* mask, int
     const bool retry = ratio < config_.reselect_below || ratio > config_.reselect_above;
     if (!retry || block_ == used) break;
   }
-  if (out->size() > static_cast<std::size_t>(wanted)) thin(wanted, out);
+}
+
+/// When blocks as small as can be gave too few pixels. False: enough, or it is as low as may be.
+bool PixelSelector::lower_threshold(const std::vector<SelectedPixel>& selected, int wanted) {
+  const double least = std::min(1.0, config_.least_offset / config_.threshold_offset);
+  const bool enough = static_cast<double>(selected.size()) >= config_.reselect_below * wanted;
+  if (enough || block_ > kSmallBlock || !(threshold_share_ > least)) return false;
+  threshold_share_ = std::max(least, kLower * threshold_share_);
+  block_ = std::clamp(config_.initial_block, 1, kMaxBlock);
+  return true;
+}
+
+/// For the next image, when the blocks of this one are so large that each has a choice.
+void PixelSelector::raise_threshold() {
+  if (block_ >= kLargeBlock) threshold_share_ = std::min(1.0, kRaise * threshold_share_);
 }
 
 /// Median of |grad I| over every second pixel of every second row of each region.
 void PixelSelector::compute_medians(const ImageF& image) {
   const int w = image.width();
   const int h = image.height();
+  const int side = std::max(8, config_.threshold_block);
+  regions_x_ = std::max(1, (w + side / 2) / side);
+  regions_y_ = std::max(1, (h + side / 2) / side);
+  medians_.resize(static_cast<std::size_t>(regions_x_) * regions_y_);
   gradient_row_.resize(static_cast<std::size_t>(w));
   for (int ry = 0; ry < regions_y_; ++ry) {
     histograms_.assign(static_cast<std::size_t>(regions_x_), {});
@@ -185,21 +218,17 @@ void PixelSelector::compute_medians(const ImageF& image) {
   }
 }
 
-void PixelSelector::compute_thresholds(const ImageF& image) {
-  const int side = std::max(8, config_.threshold_block);
-  regions_x_ = std::max(1, (image.width() + side / 2) / side);
-  regions_y_ = std::max(1, (image.height() + side / 2) / side);
-  medians_.resize(static_cast<std::size_t>(regions_x_) * regions_y_);
+/// Squared, of a region's median and those around it.
+void PixelSelector::compute_thresholds() {
   thresholds_.resize(medians_.size());
-  compute_medians(image);
-  for (float& median : medians_) median += static_cast<float>(config_.threshold_offset);
+  const auto offset = static_cast<float>(threshold_share_ * config_.threshold_offset);
   for (int ry = 0; ry < regions_y_; ++ry) {
     for (int rx = 0; rx < regions_x_; ++rx) {
       float sum = 0.0F;
       int count = 0;
       for (int y = std::max(0, ry - 1); y <= std::min(regions_y_ - 1, ry + 1); ++y) {
         for (int x = std::max(0, rx - 1); x <= std::min(regions_x_ - 1, rx + 1); ++x) {
-          sum += medians_[static_cast<std::size_t>(y * regions_x_ + x)];
+          sum += medians_[static_cast<std::size_t>(y * regions_x_ + x)] + offset;
           ++count;
         }
       }
@@ -378,7 +407,7 @@ bool PixelSelector::finest_pixel(const ImageF& image, int level, int x, int y,
       const float g2 = squared_gradient(image, px, py);
       if (found && g2 <= pixel->gradient_squared) continue;
       *pixel = {static_cast<std::int16_t>(px), static_cast<std::int16_t>(py),
-                static_cast<std::uint8_t>(side), g2};
+                static_cast<std::uint8_t>(side), g2, static_cast<float>(threshold_share_)};
       found = true;
     }
   }

@@ -12,6 +12,7 @@ namespace sovo {
 struct PixelSelectorConfig {
   int threshold_block = 32;         ///< Side of the regions with one threshold each [px].
   double threshold_offset = 7.0;    ///< Added to a region's median gradient [grey levels / px].
+  double least_offset = 2.5;        ///< As far as that may sink where there is little texture.
   double level_threshold_1 = 0.75;  ///< Threshold on the squared gradient of level 1, relative.
   double level_threshold_2 = 0.42;  ///< The same for level 2.
   int border = 4;                   ///< Nearest a pixel comes to the edge of the image [px].
@@ -25,6 +26,7 @@ struct PixelSelectorConfig {
   void visit(Visitor& v) {
     v("threshold_block", threshold_block, "side of the regions with one gradient threshold [px]");
     v("threshold_offset", threshold_offset, "added to the median gradient [grey levels/px]");
+    v("least_offset", least_offset, "least of that, with little texture [grey levels/px]");
     v("level_threshold_1", level_threshold_1, "squared threshold at level 1, relative to level 0");
     v("level_threshold_2", level_threshold_2, "squared threshold at level 2, relative to level 0");
     v("border", border, "least distance to the edge of the image [px]");
@@ -46,13 +48,17 @@ struct SelectedPixel {
   std::int16_t y = 0;            ///< At level 0.
   std::uint8_t type = 1;         ///< 1, 2, 4: found in the gradients of level 0, 1, 2.
   float gradient_squared = 0.F;  ///< At level 0 [(grey levels / px)^2].
+  /// Part of `threshold_offset` that was asked of it: below 1 where the image has little texture.
+  float threshold_share = 1.0F;
 };
 
 /// Chooses pixels with enough gradient, spread over the whole image (Engel, Koltun, Cremers,
 /// "Direct Sparse Odometry", sec. 3.2). The image is cut into blocks of d, 2d and 4d pixels; a
 /// block gives the pixel of the largest |grad I * n| above its region's threshold, n a random
 /// direction; coarser blocks give one only where no finer block within them did, by gradients of
-/// the coarser pyramid level. d follows the wanted number from call to call.
+/// the coarser pyramid level. d follows the wanted number from call to call. Where even blocks of a
+/// pixel or two give too few, as on sand or in turbid water, the threshold comes down nearer to the
+/// region's median, and goes up again with more texture.
 class PixelSelector {
  public:
   explicit PixelSelector(const PixelSelectorConfig& config = {});
@@ -63,15 +69,21 @@ class PixelSelector {
   void select(const ImagePyramid& pyramid, const ImageU8* mask, int wanted,
               std::vector<SelectedPixel>* out);
 
-  /// Back to the state after construction: seed and block size.
+  /// Back to the state after construction: seed, block size and threshold.
   void reset();
 
   /// Side of the blocks that the next call begins with [px].
   int block() const { return block_; }
 
+  /// Present part of `threshold_offset`, in (0, 1].
+  double threshold_share() const { return threshold_share_; }
+
  private:
-  void compute_thresholds(const ImageF& image);
   void compute_medians(const ImageF& image);
+  void compute_thresholds();
+  void select_enough(const ImagePyramid& pyramid, int wanted, std::vector<SelectedPixel>* out);
+  bool lower_threshold(const std::vector<SelectedPixel>& selected, int wanted);
+  void raise_threshold();
   void erode_mask(const ImageU8& mask);
   void select_all_levels(const ImagePyramid& pyramid, std::vector<SelectedPixel>* out);
   void select_level(const ImagePyramid& pyramid, int level, std::vector<SelectedPixel>* out);
@@ -86,6 +98,7 @@ class PixelSelector {
   PixelSelectorConfig config_;
   std::uint64_t random_state_ = 0;
   int block_ = 3;
+  double threshold_share_ = 1.0;
 
   int regions_x_ = 0, regions_y_ = 0;
   std::vector<float> medians_, thresholds_;       // per region; thresholds are squared gradients

@@ -58,6 +58,9 @@ class Robustness(SimTest):
     def test_turbid_water_leaves_a_fifth_of_the_contrast(self):
         self.expect_whole(*self.fly("pool", "--frames", 80, veil=0.8), 0.05)
 
+    def test_turbid_water_leaves_a_fifteenth_of_the_contrast(self):
+        self.expect_whole(*self.fly("pool", "--frames", 80, veil=0.935), 0.05)
+
     def test_nothing_is_claimed_where_nothing_can_be_seen(self):
         result = self.fly("pool", "--frames", 40, code=FAILED, veil=0.97)
         self.assertIn("no frame was tracked", result.stderr)

@@ -233,6 +233,37 @@ TEST(StaticMatcher, UniformAndEpipolarStripesHaveNoTexture) {
   EXPECT_GT(count_state(stripes, MatchState::kNoTexture, &points), 0.95 * points);
 }
 
+TEST(StaticMatcher, WeakTextureIsMatchedWhenLessIsAsked) {
+  const Views wall_of_sand = wall([](double s, double t) {
+    return 100.0 + 2.0 * (std::sin(31.0 * s + 7.0 * t) + std::sin(13.7 * s - 23.0 * t) +
+                          std::sin(43.3 * s + 19.0 * t) + std::sin(22.1 * s - 39.0 * t) +
+                          std::sin(9.3 * s + 5.0 * t) + std::sin(36.9 * s - 3.0 * t));
+  });
+  const StaticMatcher matcher({}, wall_of_sand.rig);
+  const auto disparity = static_cast<float>(wall_of_sand.rig.left.fx * 0.12 / 3.0);
+  int refused = 0;
+  int matched = 0;
+  int right = 0;
+  int points = 0;
+  for (int y = 20; y < wall_of_sand.rig.left.height - 20; y += 9) {
+    for (int x = 60; x < wall_of_sand.rig.left.width - 20; x += 9) {
+      const auto match = [&](float share) {
+        return matcher.match(wall_of_sand.left, wall_of_sand.right, static_cast<float>(x),
+                             static_cast<float>(y), {.gradient_share = share});
+      };
+      ++points;
+      refused += match(1.0F).state == MatchState::kNoTexture ? 1 : 0;
+      const StaticMatch weak = match(0.36F);
+      if (weak.state != MatchState::kMatched) continue;
+      ++matched;
+      right += std::abs(weak.disparity_px - disparity) < 1.0F ? 1 : 0;
+    }
+  }
+  EXPECT_GT(refused, 0.9 * points);
+  EXPECT_GT(matched, 0.3 * points);
+  EXPECT_GT(right, 0.97 * matched);
+}
+
 TEST(StaticMatcher, PointsAtInfinityAreMatched) {
   const Views views = render(plain_rig(), 14);
   // Both views from one place: everything is at infinity for this rig.

@@ -170,6 +170,38 @@ TEST(PixelSelector, WeakTextureGivesFewPixelsAndNoneWithoutAny) {
   for (const SelectedPixel& p : pixels) EXPECT_NEAR(p.x, 319.5, 4.0);
 }
 
+TEST(PixelSelector, TheThresholdFollowsTheContrast) {
+  constexpr int kWanted = 800;
+  const ImageF full = textured(640, 480);
+  ImageF weak = full;
+  for (std::size_t i = 0; i < weak.size(); ++i) {
+    weak.data()[i] = 128.0F + 0.15F * (full.data()[i] - 128.0F);
+  }
+  const ImagePyramid strong_pyramid = plain_pyramid(full);
+  const ImagePyramid weak_pyramid = plain_pyramid(weak);
+  PixelSelectorConfig fixed;
+  fixed.least_offset = fixed.threshold_offset;
+  PixelSelector unyielding(fixed);
+  EXPECT_LT(select(&unyielding, weak_pyramid, kWanted).size(), kWanted / 2U)
+      << "the test needs too little texture";
+
+  PixelSelector selector;
+  for (const SelectedPixel& p : select(&selector, strong_pyramid, kWanted)) {
+    EXPECT_EQ(p.threshold_share, 1.0F);
+  }
+  const auto pixels = select(&selector, weak_pyramid, kWanted);
+  EXPECT_GE(pixels.size(), 0.8 * kWanted);
+  for (const SelectedPixel& p : pixels) {
+    EXPECT_LT(p.threshold_share, 0.7F);
+    EXPECT_EQ(p.threshold_share, pixels.front().threshold_share);
+  }
+  for (int i = 0; i < 12; ++i) select(&selector, strong_pyramid, kWanted);
+  EXPECT_EQ(selector.threshold_share(), 1.0) << "with more texture it goes up again";
+  select(&selector, weak_pyramid, kWanted);
+  selector.reset();
+  EXPECT_EQ(selector.threshold_share(), 1.0);
+}
+
 TEST(PixelSelector, CoarseBlocksTakeOverWhereTheFineLevelIsWeak) {
   // A ramp of 6 grey levels a pixel beside flat ground: below the level-0 threshold of 7, above
   // the level-1 threshold (12 grey levels a level-1 pixel against 7 * sqrt(.75)).

@@ -128,9 +128,11 @@ bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage&
     ++good;
     relative_sigma += points[i].depth.sigma / std::max(points[i].depth.rho, 1e-6F);
   }
-  constexpr std::size_t kFewest = 100;
+  // Depths of weak texture are rougher: it takes more of them.
+  const bool weak = !pixels.empty() && pixels.front().threshold_share < 1.0F;
+  const std::size_t fewest = weak ? 200 : 100;
   const double share = in_view > 0 ? static_cast<double>(good) / static_cast<double>(in_view) : 0.0;
-  if (good < kFewest || (config_.init == InitMethod::kAuto && share < config_.init_min_matched)) {
+  if (good < fewest || (config_.init == InitMethod::kAuto && share < config_.init_min_matched)) {
     reason_ = "only " + std::to_string(good) + " of " + std::to_string(in_view) +
               " static stereo matches are good: too little texture, repetitive texture, or a "
               "wrong calibration (sovo calib check)";

@@ -17,6 +17,9 @@ constexpr int kSmallBlock = 2;
 constexpr int kLargeBlock = 10;
 constexpr double kLower = 0.6;  ///< Steps of the threshold's offset.
 constexpr double kRaise = 1.2;
+/// Images for which a lowered threshold stays: raised too soon it is lowered again, at the cost of
+/// another selection.
+constexpr int kPatience = 10;
 
 struct Directions {
   std::array<float, kNumDirections> x{}, y{};
@@ -129,6 +132,7 @@ void PixelSelector::reset() {
   random_state_ = static_cast<std::uint64_t>(config_.seed);
   block_ = std::clamp(config_.initial_block, 1, kMaxBlock);
   threshold_share_ = 1.0;
+  since_lowered_ = 0;
 }
 
 /// SplitMix64 (Steele, Lea, Flood, "Fast splittable pseudorandom number generators"), upper half.
@@ -178,13 +182,16 @@ bool PixelSelector::lower_threshold(const std::vector<SelectedPixel>& selected, 
   const bool enough = static_cast<double>(selected.size()) >= config_.reselect_below * wanted;
   if (enough || block_ > kSmallBlock || !(threshold_share_ > least)) return false;
   threshold_share_ = std::max(least, kLower * threshold_share_);
+  since_lowered_ = 0;
   block_ = std::clamp(config_.initial_block, 1, kMaxBlock);
   return true;
 }
 
 /// For the next image, when the blocks of this one are so large that each has a choice.
 void PixelSelector::raise_threshold() {
-  if (block_ >= kLargeBlock) threshold_share_ = std::min(1.0, kRaise * threshold_share_);
+  if (block_ >= kLargeBlock && ++since_lowered_ > kPatience) {
+    threshold_share_ = std::min(1.0, kRaise * threshold_share_);
+  }
 }
 
 /// Median of |grad I| over every second pixel of every second row of each region.

@@ -99,6 +99,7 @@ class PixelSelector {
   std::uint64_t random_state_ = 0;
   int block_ = 3;
   double threshold_share_ = 1.0;
+  int since_lowered_ = 0;  ///< Images with large blocks since the threshold was lowered.
 
   int regions_x_ = 0, regions_y_ = 0;
   std::vector<float> medians_, thresholds_;       // per region; thresholds are squared gradients

@@ -195,7 +195,7 @@ TEST(PixelSelector, TheThresholdFollowsTheContrast) {
     EXPECT_LT(p.threshold_share, 0.7F);
     EXPECT_EQ(p.threshold_share, pixels.front().threshold_share);
   }
-  for (int i = 0; i < 12; ++i) select(&selector, strong_pyramid, kWanted);
+  for (int i = 0; i < 20; ++i) select(&selector, strong_pyramid, kWanted);
   EXPECT_EQ(selector.threshold_share(), 1.0) << "with more texture it goes up again";
   select(&selector, weak_pyramid, kWanted);
   selector.reset();

@@ -64,7 +64,7 @@ class Robustness(SimTest):
     def test_a_twelfth_of_the_light_without_exposure_control(self):
         dim = {"light_from_s": 0, "auto_exposure": "false", "exposure_ms": 8}
         self.expect_whole(*self.fly("hall", "--frames", 80, light_factor=0.08, **dim), 0.1)
-        result = self.fly("hall", "--frames", 20, code=FAILED, light_factor=0.03, **dim)
+        result = self.fly("hall", "--frames", 20, code=FAILED, light_factor=0.04, **dim)
         self.assertIn("no frame was tracked", result.stderr)
 
     def test_nothing_is_claimed_where_nothing_can_be_seen(self):

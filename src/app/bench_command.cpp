@@ -175,7 +175,7 @@ void add_bench_command(const Command& program) {
   options->value("--seed", "sim.seed", "Of the first run: world, noise and odometry", "N")
       .value("--calib", "camera.calibration", "Cameras to render with, not the world's", "FILE")
       .value("--frames", "camera.frames", "Frames at most", "N")
-      .value("--mode", "mode", "Who owns the metric scale", "mono|scale")
+      .value("--mode", "mode", "Who owns the metric scale", "mono|scale|stereo")
       .value("--preset", "preset", "Values to begin with", "embedded|default|quality")
       .value("--threads", "threads", "Of the loops inside the stages", "N");
   command.action([options, arguments] {

@@ -135,7 +135,7 @@ void add_sim_options(ConfigOptions& options) {
 }
 
 void add_odometry_options(ConfigOptions& options) {
-  options.value("--mode", "mode", "Who owns the metric scale", "mono|scale")
+  options.value("--mode", "mode", "Who owns the metric scale", "mono|scale|stereo")
       .value("--preset", "preset", "Values to begin with", "embedded|default|quality")
       .value("--init", "init", "How the map begins", "auto|stereo|two_view")
       .value("--depth-init", "depth_init", "A new point's first depth interval", "temporal|stereo")

@@ -100,7 +100,7 @@ void add_replay_test_command(const Command& program) {
              "FILE")
       .value("--left", "node.left", "Image topic of the left camera", "TOPIC")
       .value("--right", "node.right", "That of the right camera", "TOPIC")
-      .value("--mode", "mode", "Who owns the metric scale", "mono|scale")
+      .value("--mode", "mode", "Who owns the metric scale", "mono|scale|stereo")
       .value("--seed", "seed", "Of every random choice", "N");
   command.option("--golden", "Golden file to compare with", &arguments->file).type("FILE.json");
   command.flag("--update", "Write the golden file anew; its tolerances stay", &arguments->update);

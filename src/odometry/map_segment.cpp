@@ -115,8 +115,9 @@ bool MapSegment::initialize(const MonoFrame& frame, const SideImage* right) {
 bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage& right) {
   const std::vector<SelectedPixel> pixels =
       vo_.select_pixels(frame, config_.vo.points.active_points);
-  const ImagePyramid right_pyramid = preparation_.prepare_right(right);
-  const std::vector<StaticMatch> matches = match_all(*frame.pyramid, right_pyramid, pixels);
+  const auto right_pyramid =
+      std::make_shared<const ImagePyramid>(preparation_.prepare_right(right));
+  const std::vector<StaticMatch> matches = match_all(*frame.pyramid, *right_pyramid, pixels);
   std::vector<StartPoint> points(pixels.size());
   std::size_t good = 0;
   std::size_t in_view = 0;
@@ -138,7 +139,8 @@ bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage&
               "wrong calibration (sovo calib check)";
     return false;
   }
-  vo_.begin(frame, T_odom_left_start_, points);
+  if (stereo()) vo_.use_static_residuals(preparation_.rig());
+  vo_.begin(frame, T_odom_left_start_, points, stereo() ? right_pyramid : nullptr);
   // Matching errors are independent; what remains is common to all (calibration).
   filter_.lock_initial(relative_sigma / static_cast<double>(good) / std::sqrt(good),
                        frame.stamp_ns);
@@ -257,29 +259,30 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
     }
   };
   ScaleJob job;
-  DepthProposer proposer;
+  KeyframeStereo keyframe_stereo;
   const bool use_right = tracked.wants_keyframe && right != nullptr;
   if (use_right) {
     const auto start = std::chrono::steady_clock::now();
-    job.right = preparation_.prepare_right(*right);
+    job.right = std::make_shared<const ImagePyramid>(preparation_.prepare_right(*right));
     job.pyramid_seconds = seconds_since(start);
     // Depths of an unscaled map are no metres.
     const bool metric = filter_.locked();
-    if (config_.mode == OdometryMode::kScale && config_.depth_init == DepthInit::kStereo &&
-        metric) {
-      proposer = stereo_proposer(tracked.frame.pyramid, job.right);
+    if (config_.mode != OdometryMode::kMono && config_.depth_init == DepthInit::kStereo && metric) {
+      keyframe_stereo.depths = stereo_proposer(tracked.frame.pyramid, *job.right);
     }
+    if (stereo() && metric) keyframe_stereo.right = job.right;
   }
-  out.map = vo_.map(tracked, proposer, timer);
+  out.map = vo_.map(tracked, keyframe_stereo, timer);
   broken_ = out.map.failed;
   if (!out.map.is_keyframe || out.map.failed) return out;
+  window_scale_variance_ = out.map.bundle.scale_variance + std::pow(config_.scale.sigma_floor, 2);
   if (observer_ != nullptr) {
     observer_->on_window(static_cast<std::uint32_t>(out.map.bundle.points),
                          static_cast<std::uint32_t>(out.map.bundle.residuals));
   }
   out.keyframes = {new_keyframe()};
   revise_left(std::exchange(out.map.left, {}), &out.keyframes);
-  if (use_right && config_.mode == OdometryMode::kScale && vo_.snapshot()) {
+  if (use_right && config_.mode != OdometryMode::kMono && vo_.snapshot()) {
     job.snapshot = *vo_.snapshot();
     job.cold_start = filter_.wants_cold_start();
     out.scale_job = std::move(job);
@@ -289,7 +292,7 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
 
 ScaleEstimate MapSegment::estimate_scale(const ScaleJob& job) const {
   const auto start = std::chrono::steady_clock::now();
-  const ScaleEstimate estimate = optimizer_.estimate(job.snapshot, job.right, job.cold_start);
+  const ScaleEstimate estimate = optimizer_.estimate(job.snapshot, *job.right, job.cold_start);
   if (observer_ != nullptr) {
     observer_->on_stage(Stage::kScaleOptimization, job.pyramid_seconds + seconds_since(start));
   }
@@ -312,7 +315,8 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
   last_keyframe_position_ = position;
 
   const double sigma_before = filter_.path_sigma();
-  const ScaleUpdate update = filter_.update(m);
+  const ScaleUpdate update =
+      stereo() ? filter_.watch(m, window_scale_variance_) : filter_.update(m);
   ScaleRecord record;
   record.stamp_ns = job.snapshot.stamp_ns;
   record.keyframe_id = job.snapshot.id;
@@ -328,9 +332,11 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
     correction.first_lock = !was_locked;
     record.correction = vo_.apply(correction);
     if (correction.first_lock) refined_until_ = 0;  // it rescales what was built before
+    if (stereo()) vo_.use_static_residuals(preparation_.rig());
   }
   if (was_locked) {
-    extend_scale_path(position, sigma_before);
+    // Where static residuals hold the scale, its errors are in the poses' own covariance.
+    extend_scale_path(position, stereo() ? 0.0 : sigma_before);
   } else if (filter_.locked()) {
     // All that was built before took this scale at once, about the newest keyframe.
     scale_path_covariance_.setZero();
@@ -338,7 +344,8 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
         position - std::exp(record.correction) * (position - T_odom_left_start_.translation());
     extend_scale_path(position, filter_.path_sigma());
   }
-  publish_scale(&record, update.apply);
+  const bool watched = stereo() && update.verdict == ScaleVerdict::kAccepted;
+  publish_scale(&record, update.apply || watched);
   return record;
 }
 
@@ -353,7 +360,7 @@ void MapSegment::extend_scale_path(const Vec3& position, double sigma) {
 
 void MapSegment::publish_scale(const ScaleRecord* record, bool accepted) {
   const std::lock_guard lock(status_mutex_);
-  status_.locked = filter_.locked() && config_.mode == OdometryMode::kScale;
+  status_.locked = metric();
   status_.log_scale = vo_.log_scale();
   status_.sigma = filter_.sigma();
   status_.path_covariance = scale_path_covariance_;
@@ -418,7 +425,7 @@ void MapSegment::revise(const SE3& T_odom_left, KeyframeOutput* keyframe) const 
 void MapSegment::revise_left(const std::vector<KeyframeState>& left,
                              std::vector<KeyframeOutput>* out) {
   for (const KeyframeState& state : left) waiting_.push_back(own_points(state));
-  if (config_.mode == OdometryMode::kScale && !metric()) {
+  if (config_.mode != OdometryMode::kMono && !metric()) {
     if (waiting_.size() > kMostWaiting) {
       waiting_.erase(waiting_.begin(), waiting_.end() - static_cast<std::ptrdiff_t>(kMostWaiting));
     }

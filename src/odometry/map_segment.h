@@ -31,7 +31,7 @@ struct ScaleStatus {
 /// A keyframe's snapshot with the right image that was taken with it.
 struct ScaleJob {
   KeyframeSnapshot snapshot;
-  ImagePyramid right;
+  ImagePyramidPtr right;
   double pyramid_seconds = 0.0;  ///< What the right pyramid cost.
   bool cold_start = false;
 };
@@ -93,7 +93,9 @@ class MapSegment {
   std::vector<StaticMatch> match_all(const ImagePyramid& left, const ImagePyramid& right,
                                      const std::vector<SelectedPixel>& pixels) const;
   DepthProposer stereo_proposer(const ImagePyramidPtr& left, const ImagePyramid& right) const;
-  bool metric() const { return filter_.locked() && config_.mode == OdometryMode::kScale; }
+  bool metric() const { return filter_.locked() && config_.mode != OdometryMode::kMono; }
+  /// Whether static residuals own the scale, not similarities.
+  bool stereo() const { return config_.mode == OdometryMode::kStereo; }
   KeyframeOutput first_keyframe() const;
   KeyframeOutput new_keyframe() const;
   KeyframeOutput own_points(const KeyframeState& state) const;
@@ -114,6 +116,7 @@ class MapSegment {
   ScaleOptimizer optimizer_;
   ScaleFilter filter_;
 
+  double window_scale_variance_ = 0.0;  ///< Mode stereo: after the last bundle adjustment.
   bool initialized_ = false;
   bool broken_ = false;
   std::uint32_t attempts_ = 0;  ///< Frames given to `initialize`.

@@ -271,7 +271,7 @@ class StereoOdometry::Impl {
     const bool tracked = t.good;
     if (tracked && t.inlier_ratio < kDegradedInliers) return OdometryState::kDegraded;
     if (!right_problem.empty()) return OdometryState::kDegraded;
-    const bool scaled = config_.mode == OdometryMode::kScale;
+    const bool scaled = config_.mode != OdometryMode::kMono;
     if (scaled && (!out.scale_valid || scale_is_old(out))) return OdometryState::kScaleUnobserved;
     return OdometryState::kTracking;
   }

@@ -17,8 +17,9 @@ namespace sovo {
 
 /// Who owns the metric scale.
 enum class OdometryMode {
-  kMono,   ///< Static matches at the first keyframe only.
-  kScale,  ///< Temporal residuals in the window, scale optimization beside it (SO-DSO).
+  kMono,    ///< Static matches at the first keyframe only.
+  kScale,   ///< Temporal residuals in the window, scale optimization beside it (SO-DSO).
+  kStereo,  ///< Static residuals in the window own the scale (as Stereo DSO).
 };
 
 /// How the map begins.
@@ -35,8 +36,10 @@ enum class DepthInit {
 };
 
 /// Names of enum values in configuration files, found by argument-dependent lookup.
-constexpr std::array<std::pair<OdometryMode, const char*>, 2> enum_names(OdometryMode) {
-  return {{{OdometryMode::kMono, "mono"}, {OdometryMode::kScale, "scale"}}};
+constexpr std::array<std::pair<OdometryMode, const char*>, 3> enum_names(OdometryMode) {
+  return {{{OdometryMode::kMono, "mono"},
+           {OdometryMode::kScale, "scale"},
+           {OdometryMode::kStereo, "stereo"}}};
 }
 constexpr std::array<std::pair<InitMethod, const char*>, 3> enum_names(InitMethod) {
   return {{{InitMethod::kAuto, "auto"},

@@ -69,6 +69,32 @@ ScaleUpdate ScaleFilter::update(const ScaleMeasurement& m) {
   return update;
 }
 
+ScaleUpdate ScaleFilter::watch(const ScaleMeasurement& m, double variance) {
+  if (!locked_) return update(m);
+  variance_ = path_variance_ = variance;
+  ScaleUpdate update;
+  update.verdict = m.estimate.verdict;
+  update.innovation = m.estimate.log_scale - m.pending_log_scale;
+  const double doubted = variance + measured_variance(m) + square(kLargestDrift);
+  update.nis = square(update.innovation) / doubted;
+  if (is_miss(update.verdict)) {
+    miss(m.estimate);
+  } else if (update.verdict == ScaleVerdict::kAccepted && square(update.innovation) <= doubted) {
+    agree_again();
+    searching_ = false;
+    accepted_stamp_ns_ = m.stamp_ns;
+  } else if (update.verdict == ScaleVerdict::kAccepted && m.cold_start) {
+    update = lock_on(m, update, measured_variance(m));
+  } else if (update.verdict == ScaleVerdict::kAccepted) {
+    update.verdict = ScaleVerdict::kInnovation;
+    disagree_with(update, measured_variance(m));
+  } else {
+    disagree();
+  }
+  last_verdict_ = update.verdict;
+  return update;
+}
+
 ScaleUpdate ScaleFilter::update_tracking(const ScaleMeasurement& m) {
   ScaleUpdate update;
   update.verdict = m.estimate.verdict;

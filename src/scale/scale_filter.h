@@ -90,6 +90,11 @@ class ScaleFilter {
 
   ScaleUpdate update(const ScaleMeasurement& measurement);
 
+  /// The same for a window that keeps its scale by itself, with this variance of log-scale: a
+  /// measurement corrects nothing, unless many disagree by more than what moves a scale (5 %), and
+  /// a cold start then finds it elsewhere.
+  ScaleUpdate watch(const ScaleMeasurement& measurement, double variance);
+
   bool locked() const { return locked_; }
   /// Whether the next estimate should search the whole range.
   bool wants_cold_start() const { return !locked_ || searching_; }

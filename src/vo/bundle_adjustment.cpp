@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sovo/geometry/linear_solvers.h"
+#include "sovo/vo/static_residual.h"
 
 namespace sovo {
 
@@ -104,11 +105,11 @@ VecX BundleAdjuster::state_units(const Window& window) {
 }
 
 MatX BundleAdjuster::gauge_basis(const Window& window, const VecX& units) {
-  MatX n = MatX::Zero(8 * window.size(), 7);
+  MatX n = MatX::Zero(8 * window.size(), window.scale_held() ? 6 : 7);
   for (int i = 0; i < window.size(); ++i) {
     const SE3& T = window[i].frozen_T_camera_world;
     n.block<6, 6>(8 * i, 0) = T.adjoint();
-    n.block<3, 1>(8 * i, 6) = T.translation();
+    if (!window.scale_held()) n.block<3, 1>(8 * i, 6) = T.translation();
   }
   n = units.cwiseInverse().asDiagonal() * n;
   return orthonormalized(n);
@@ -116,6 +117,7 @@ MatX BundleAdjuster::gauge_basis(const Window& window, const VecX& units) {
 
 MatX BundleAdjuster::removable_gauge(const Window& window, const VecX& units) {
   if (window[0].id != 0) return gauge_basis(window, units);
+  if (window.scale_held()) return MatX::Zero(8 * window.size(), 0);
   // The first keyframe's prior holds the pose: what is left is scale about its camera centre.
   const Vec3 centre = window[0].frozen_T_camera_world.inverse().translation();
   MatX n = MatX::Zero(8 * window.size(), 1);
@@ -152,7 +154,7 @@ VecX BundleAdjuster::solve(const Window& window, const NormalEquations& system, 
   VecX y = -balance.cwiseProduct(solve_symmetric(balanced, balance.cwiseProduct(b)));
   if (remove_gauge) {
     const MatX basis = removable_gauge(window, units);
-    y -= basis * (basis.transpose() * y);
+    if (basis.cols() > 0) y -= basis * (basis.transpose() * y);
   }
   return units.cwiseProduct(y);
 }
@@ -183,6 +185,7 @@ void BundleAdjuster::drop_bad_residuals(Window* window) const {
         p.last_but_one_state = p.last_state;
         p.last_state = p.residuals[newest].state;
       }
+      if (p.static_state != ResidualState::kIn) p.static_state = ResidualState::kAbsent;
       for (int t = 0; t < window->size(); ++t) {
         Residual& r = p.residuals[static_cast<std::size_t>((*window)[t].slot)];
         if (r.state == ResidualState::kIn) {
@@ -197,28 +200,37 @@ void BundleAdjuster::drop_bad_residuals(Window* window) const {
   }
 }
 
+/// The system of all states but the pose of keyframe `fixed`, in state units.
+MatX BundleAdjuster::without_pose(const Window& window, const MatX& H, int fixed) {
+  std::vector<Eigen::Index> free;
+  for (Eigen::Index i = 0; i < 8 * window.size(); ++i) {
+    if (i < 8 * fixed || i >= 8 * fixed + 6) free.push_back(i);
+  }
+  return H(free, free);
+}
+
+/// The scale of the world about a keyframe, in state units.
+VecX BundleAdjuster::scale_direction(const Window& window, int about, const VecX& units) {
+  const Vec3 centre = window[about].T_world_camera().translation();
+  VecX scale = VecX::Zero(units.size());
+  for (int i = 0; i < window.size(); ++i) {
+    scale.segment<3>(8 * i) = window[i].T_camera_world * centre;
+  }
+  return units.cwiseInverse().cwiseProduct(scale);
+}
+
 Mat6 BundleAdjuster::newest_covariance(const Window& window, const NormalEquations& system) const {
   const int newest = window.size() - 1;
   if (newest < 1) return Mat6::Zero();
   const int before = newest - 1;
   const VecX units = state_units(window);
   MatX H = units.asDiagonal() * reduced(window, system, 0.0).H * units.asDiagonal();
-  // The scale of the world about the keyframe before; the pose of that is left out below.
-  const Vec3 centre = window[before].T_world_camera().translation();
-  VecX scale = VecX::Zero(H.rows());
-  for (int i = 0; i <= newest; ++i) {
-    scale.segment<3>(8 * i) = window[i].T_camera_world * centre;
-  }
-  scale = units.cwiseInverse().cwiseProduct(scale);
-  if (scale.norm() > 0.0) {
+  const VecX scale = scale_direction(window, before, units);
+  if (scale.norm() > 0.0 && !window.scale_held()) {
     const double held = H.diagonal().segment<8>(8 * newest).maxCoeff();
     H += held * scale * scale.transpose() / scale.squaredNorm();
   }
-  std::vector<Eigen::Index> free;
-  for (Eigen::Index i = 0; i < H.rows(); ++i) {
-    if (i < 8 * before || i >= 8 * before + 6) free.push_back(i);
-  }
-  const MatX A = H(free, free);
+  const MatX A = without_pose(window, H, before);
   const Eigen::Index n = A.rows();
   MatX columns = MatX::Zero(n, 6);  // of the newest pose: the last eight but its a and b
   columns.block<6, 6>(n - 8, 0).setIdentity();
@@ -227,6 +239,20 @@ Mat6 BundleAdjuster::newest_covariance(const Window& window, const NormalEquatio
   const Mat6 covariance = unit.asDiagonal() * unit_free * unit.asDiagonal();
   const bool usable = covariance.allFinite() && covariance.diagonal().minCoeff() > 0.0;
   return usable ? Mat6(0.5 * (covariance + covariance.transpose())) : Mat6(Mat6::Zero());
+}
+
+double BundleAdjuster::scale_variance(const Window& window, const NormalEquations& system) const {
+  if (window.size() < 2 || !window.scale_held()) return 0.0;
+  const VecX units = state_units(window);
+  const MatX H = units.asDiagonal() * reduced(window, system, 0.0).H * units.asDiagonal();
+  // Nothing of the scale about the oldest keyframe is in that one's own pose.
+  const VecX all = scale_direction(window, 0, units);
+  const VecX scale = all.tail(all.size() - 6);
+  const double length = scale.squaredNorm();
+  if (length <= 0.0) return 0.0;
+  const MatX solved = solve_symmetric_columns(without_pose(window, H, 0), scale);
+  const double variance = scale.dot(solved.col(0)) / (length * length);
+  return std::isfinite(variance) && variance > 0.0 ? variance : 0.0;
 }
 
 NormalEquations BundleAdjuster::iterate(PhotometricProblem* problem, Window* window,
@@ -267,12 +293,17 @@ NormalEquations BundleAdjuster::iterate(PhotometricProblem* problem, Window* win
 
 BundleResult BundleAdjuster::optimize(Window* window) {
   BundleResult result;
+  if (window->rig() != nullptr) {
+    for (int i = 0; i < window->size(); ++i) {
+      refine_right_brightness(*window->rig(), config_, &(*window)[i]);
+    }
+  }
   PhotometricProblem problem(config_, collect_points(window), window, pool_);
   window->update_geometry();
   const WindowLinearization known = problem.stored();
   WindowLinearization now = known;
   const auto newest = static_cast<unsigned>(window->size() - 1);
-  problem.linearize(known, {.system = false, .targets = 1U << newest}, &now);
+  problem.linearize(known, {.system = false, .statics = false, .targets = 1U << newest}, &now);
   update_outlier_threshold(now, window);
   problem.linearize(known, {}, &now);
   const SE3 oldest = (*window)[0].T_world_camera();
@@ -298,6 +329,8 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   result.gradient_scatter = problem.gradient_scatter(now, static_cast<int>(newest));
   result.newest_covariance =
       keyframe_variance(result.rmse, result.gradient_scatter) * newest_covariance(*window, solved);
+  result.scale_variance =
+      keyframe_variance(result.rmse, result.gradient_scatter) * scale_variance(*window, solved);
   drop_bad_residuals(window);
   return result;
 }

@@ -44,8 +44,10 @@ struct BundleResult {
   bool finite = true;  ///< False: the solve broke down; the window must be thrown away.
   /// Covariance of the newest keyframe's pose as seen from the keyframe before it (left
   /// perturbation of T_newest_before: translation [the window's unit], rotation [rad]), the
-  /// window's scale held. Of two keyframes or more.
+  /// window's scale held, unless static residuals hold it. Of two keyframes or more.
   Mat6 newest_covariance = Mat6::Zero();
+  /// Of the window's log-scale, where static residuals hold it; else 0.
+  double scale_variance = 0.0;
   double gradient_scatter = 1.0;  ///< Of the residuals into the newest keyframe.
 };
 
@@ -71,12 +73,16 @@ class BundleAdjuster {
   /// tell it.
   Mat6 newest_covariance(const Window& window, const NormalEquations& system) const;
 
-  /// Orthonormal basis of the seven gauge directions (motion and scale of the world) at the
-  /// linearization points, in states divided by `state_units`.
+  /// Variance of the log-scale as in `BundleResult`, for residuals of unit noise.
+  double scale_variance(const Window& window, const NormalEquations& system) const;
+
+  /// Orthonormal basis of the seven gauge directions (motion and scale of the world; of six where
+  /// static residuals hold the scale) at the linearization points, in states divided by
+  /// `state_units`.
   static MatX gauge_basis(const Window& window, const VecX& state_units);
 
   /// The directions that a step may lose: all gauge directions, or, while the first keyframe with
-  /// its prior is in the window, scale about its centre alone.
+  /// its prior is in the window, scale about its centre alone, if static residuals do not hold it.
   static MatX removable_gauge(const Window& window, const VecX& state_units);
 
   /// Units that make the states comparable: translation half the mean depth, rotation 1, a 10,
@@ -89,6 +95,8 @@ class BundleAdjuster {
     MatX H;
     VecX b;
   };
+  static MatX without_pose(const Window& window, const MatX& H, int fixed);
+  static VecX scale_direction(const Window& window, int about, const VecX& units);
   ReducedSystem reduced(const Window& window, const NormalEquations& system, double lambda) const;
   /// Sets the newest keyframe's outlier threshold from the energies of the residuals into it.
   void update_outlier_threshold(const WindowLinearization& linearized, Window* window) const;

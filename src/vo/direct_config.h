@@ -113,6 +113,7 @@ struct WindowConfig {
   double min_parallax = 2.0;               ///< Below it stereo depths stand against steps [px].
   double stop_threshold = 1.2;             ///< Times the step norms below which iteration stops.
   double resample_px = 0.01;               ///< Motion of a pattern above which it is sampled anew.
+  double static_weight = 4.0;              ///< Of residuals in a keyframe's own right image.
   double prior_a = 1e4;                    ///< Weight of the prior on each frame's log-gain.
   double prior_b = 1.0;                    ///< The same for the bias.
   double min_relative_information = 50.0;  ///< H_rho * mean_rho^2 of a point to be marginalized.
@@ -134,6 +135,8 @@ struct WindowConfig {
     v("stop_threshold", stop_threshold, "iteration stops below this x the step thresholds");
     v("resample_px", resample_px,
       "patterns that moved by less since they were sampled are not sampled again [px]; 0: always");
+    v("static_weight", static_weight,
+      "mode stereo: weight of residuals in a keyframe's own right image");
     v("prior_a", prior_a, "weight of the prior on each frame's log-gain");
     v("prior_b", prior_b, "weight of the prior on each frame's bias");
     v("min_relative_information", min_relative_information,

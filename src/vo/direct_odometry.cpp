@@ -9,6 +9,7 @@
 #include "sovo/vo/epipolar_search.h"
 #include "sovo/vo/keyframe_policy.h"
 #include "sovo/vo/marginalization.h"
+#include "sovo/vo/static_residual.h"
 #include "sovo/vo/view_forecast.h"
 
 namespace sovo {
@@ -121,8 +122,8 @@ std::vector<SelectedPixel> DirectOdometry::select_pixels(const MonoFrame& frame,
 }
 
 void DirectOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
-                           const std::vector<StartPoint>& points) {
-  window_ = Window(camera_);
+                           const std::vector<StartPoint>& points, const ImagePyramidPtr& right) {
+  window_.clear();
   keyframes_.clear();
   marginalized_.clear();
   snapshot_.reset();
@@ -149,12 +150,16 @@ void DirectOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
     }
   }
   k.points_hosted = static_cast<int>(k.points.size());
+  set_right_image(right, &k);
+  for (Point& p : k.points) {
+    if (k.right) p.static_state = ResidualState::kIn;
+  }
   window_.update_geometry();
   keyframes_.record(window_poses(), log_scale_);
   publish_reference();
 }
 
-MapResult DirectOdometry::map(const TrackedFrame& tracked, const DepthProposer& proposer,
+MapResult DirectOdometry::map(const TrackedFrame& tracked, const KeyframeStereo& stereo,
                               const MapTimer& timer) {
   // The pose hangs on its reference as that is known now.
   const auto& reference = *tracked.reference;
@@ -168,7 +173,7 @@ MapResult DirectOdometry::map(const TrackedFrame& tracked, const DepthProposer& 
     trace_all(tracked.frame, T_world_camera, tracked.tracking.affine);
   }
   if (tracked.wants_keyframe && !stale) {
-    return make_keyframe(tracked, T_world_camera, proposer, timer);
+    return make_keyframe(tracked, T_world_camera, stereo, timer);
   }
   MapResult result;
   result.active_points = window_.num_active_points();
@@ -195,7 +200,7 @@ void DirectOdometry::trace_all(const MonoFrame& frame, const SE3& T_world_camera
 }
 
 MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& T_world_camera,
-                                        const DepthProposer& proposer, const MapTimer& timer) {
+                                        const KeyframeStereo& stereo, const MapTimer& timer) {
   MapResult result;
   result.is_keyframe = true;
   mark_leaving_keyframes(config_.keyframe, &window_);
@@ -210,6 +215,7 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
   {
     const StageTimer t(timer, MapStage::kBundleAdjustment);
     activator_.activate(&window_);
+    window_.update_scale_held();
     result.bundle = adjuster_.optimize(&window_);
   }
   result.failed =
@@ -227,7 +233,8 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
   publish_reference();
   take_snapshot();
   result.left = marginalize(timer);
-  add_immature_points(proposer, timer);
+  add_immature_points(stereo.depths, timer);
+  set_right_image(stereo.right, &window_.newest());
   keyframes_.record(window_poses(), log_scale_);
   result.active_points = window_.num_active_points();
   result.keyframes = window_.size();
@@ -316,6 +323,13 @@ void DirectOdometry::add_immature_points(const DepthProposer& proposer, const Ma
     set_interval(proposals[i], config_.points.stereo_interval_sigmas, &p);
     k.immature.push_back(p);
   }
+}
+
+void DirectOdometry::set_right_image(const ImagePyramidPtr& right, Keyframe* keyframe) {
+  if (!right || window_.rig() == nullptr) return;
+  keyframe->right = right;
+  right_brightness_ = fit_right_brightness(*window_.rig(), *keyframe, right_brightness_);
+  keyframe->right_brightness = right_brightness_;
 }
 
 std::vector<WindowPose> DirectOdometry::window_poses() const {

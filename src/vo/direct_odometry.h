@@ -39,6 +39,12 @@ struct DepthProposal {
 using DepthProposer = std::function<void(const std::vector<SelectedPixel>& pixels,
                                          std::vector<DepthProposal>* proposals)>;
 
+/// What the right camera tells of a new keyframe.
+struct KeyframeStereo {
+  DepthProposer depths;   ///< Of its new pixels; empty: they begin without.
+  ImagePyramidPtr right;  ///< Its raw right image, for static residuals; null: it gets none.
+};
+
 /// A point that a map begins with.
 struct StartPoint {
   SelectedPixel pixel;
@@ -100,13 +106,17 @@ class DirectOdometry {
   DirectOdometry(const DirectConfig& config, const CameraModel& camera, const ImageU8& mask,
                  int seed, WorkerPool* pool);
 
+  /// From now on keyframes with a right image get static residuals, which hold the scale.
+  /// `rig.left` is the camera that is tracked.
+  void use_static_residuals(const StereoRig& rig) { window_.set_rig(rig); }
+
   /// Chooses the pixels that a map would begin with.
   std::vector<SelectedPixel> select_pixels(const MonoFrame& frame, int wanted);
 
   /// Begins a map with `frame` as first keyframe: points with a depth become active, the others
   /// immature. What another beginning left is forgotten.
   void begin(const MonoFrame& frame, const SE3& T_world_camera,
-             const std::vector<StartPoint>& points);
+             const std::vector<StartPoint>& points, const ImagePyramidPtr& right = nullptr);
 
   /// Tracks a frame against the newest reference. `tracking.good` is false when it is lost, also
   /// when only a pose fits that takes more than `max_acceleration` since the frames before [the
@@ -117,7 +127,7 @@ class DirectOdometry {
   TrackedFrame track_from(const MonoFrame& frame, const SE3& T_current_reference);
 
   /// Takes a tracked frame into the map: traces the immature points, or makes it a keyframe.
-  MapResult map(const TrackedFrame& tracked, const DepthProposer& proposer, const MapTimer& timer);
+  MapResult map(const TrackedFrame& tracked, const KeyframeStereo& stereo, const MapTimer& timer);
 
   /// The newest keyframe after its bundle adjustment; nothing before the second keyframe.
   const std::optional<KeyframeSnapshot>& snapshot() const { return snapshot_; }
@@ -140,9 +150,10 @@ class DirectOdometry {
  private:
   void trace_all(const MonoFrame& frame, const SE3& T_world_camera, const Affine& affine);
   MapResult make_keyframe(const TrackedFrame& tracked, const SE3& T_world_camera,
-                          const DepthProposer& proposer, const MapTimer& timer);
+                          const KeyframeStereo& stereo, const MapTimer& timer);
   std::vector<SelectedPixel> select_lasting_pixels();
   void add_immature_points(const DepthProposer& proposer, const MapTimer& timer);
+  void set_right_image(const ImagePyramidPtr& right, Keyframe* keyframe);
   std::vector<KeyframeState> marginalize(const MapTimer& timer);
   void keep_point(const Point& point, double rho_unit, KeyframePoints* points) const;
   KeyframeState state_without_active_points(const Keyframe& keyframe) const;
@@ -182,7 +193,8 @@ class DirectOdometry {
   KeyframePoses keyframes_;
   /// Of the newest keyframe's pose since the map began, as in `TrackingReference`.
   Mat6 covariance_ = Mat6::Zero();
-  double gradient_scatter_ = 1.0;                         ///< Of the last bundle adjustment.
+  BrightnessTransfer right_brightness_;  ///< Of the newest keyframe with a right image.
+  double gradient_scatter_ = 1.0;        ///< Of the last bundle adjustment.
   std::map<std::uint32_t, KeyframePoints> marginalized_;  ///< By the window's keyframes.
 
   // Shared: the reference.

@@ -45,29 +45,6 @@ void geometric_jacobian(const CameraModel& camera, const PairGeometry& g,
   r->dv = {0.0F, rho_target * fy, -rho_target * y * fy, -(1.0F + y * y) * fy, x * y * fy, x * fy};
 }
 
-void sum_pattern(const ImageF& image, const PairGeometry& g, const Point& point,
-                 const WindowConfig& config, const PatternProjection& at, LinearizedResidual* out) {
-  const PatternInput in = {.image = &image,
-                           .offset = at.offset.data(),
-                           .fx = at.fx.data(),
-                           .fy = at.fy.data(),
-                           .colour = point.colour.data(),
-                           .weight = point.weight.data(),
-                           .gain = g.gain,
-                           .bias = g.bias,
-                           .frozen_gain = g.frozen_gain,
-                           .frozen_host_b = g.frozen_host_b,
-                           .huber = static_cast<float>(config.huber),
-                           .squared_gradient_constant = static_cast<float>(
-                               config.gradient_constant * config.gradient_constant)};
-  alignas(32) std::array<float, 16> totals;
-  run_kernel<SumPattern>(in, totals.data());
-  std::copy_n(totals.begin(), 10, out->gram.begin());
-  std::copy_n(totals.begin() + 10, 4, out->gram_r.begin());
-  out->rr = totals[14];
-  out->raw_energy = totals[15];
-}
-
 /// cross = J_state^T J_rho from the Gram matrix and the geometric Jacobian.
 void fill_cross(LinearizedResidual* r) {
   const float gu = r->gram[tri(0, 0)] * r->du_rho + r->gram[tri(0, 1)] * r->dv_rho;
@@ -120,6 +97,29 @@ void prefetch_pattern(const Window& window, int target, const PatternProjection&
   }
 }
 
+void sum_pattern(const ImageF& image, const PatternBrightness& brightness, const Point& point,
+                 const WindowConfig& config, const PatternProjection& at, LinearizedResidual* out) {
+  const PatternInput in = {.image = &image,
+                           .offset = at.offset.data(),
+                           .fx = at.fx.data(),
+                           .fy = at.fy.data(),
+                           .colour = point.colour.data(),
+                           .weight = point.weight.data(),
+                           .gain = brightness.gain,
+                           .bias = brightness.bias,
+                           .frozen_gain = brightness.frozen_gain,
+                           .frozen_host_b = brightness.frozen_host_b,
+                           .huber = static_cast<float>(config.huber),
+                           .squared_gradient_constant = static_cast<float>(
+                               config.gradient_constant * config.gradient_constant)};
+  alignas(32) std::array<float, 16> totals;
+  run_kernel<SumPattern>(in, totals.data());
+  std::copy_n(totals.begin(), 10, out->gram.begin());
+  std::copy_n(totals.begin() + 10, 4, out->gram_r.begin());
+  out->rr = totals[14];
+  out->raw_energy = totals[15];
+}
+
 float linearize_projected(const Window& window, const WindowConfig& config, int host, int target,
                           const Point& point, const Residual& residual,
                           const PatternProjection& projection, LinearizedResidual* out) {
@@ -134,7 +134,8 @@ float linearize_projected(const Window& window, const WindowConfig& config, int 
     return out->energy;
   }
   geometric_jacobian(window.camera(), g, projection, out);
-  sum_pattern(target_frame.image(), g, point, config, projection, out);
+  sum_pattern(target_frame.image(), {g.gain, g.bias, g.frozen_gain, g.frozen_host_b}, point, config,
+              projection, out);
   fill_cross(out);
   const Verdict verdict = judge(window[host], target_frame, out->raw_energy, is_textured(*out));
   out->state = verdict.state;

@@ -52,6 +52,16 @@ float linearize_projected(const Window& window, const WindowConfig& config, int 
                           const Point& point, const Residual& residual,
                           const PatternProjection& projection, LinearizedResidual* out);
 
+/// Brightness from a host to a target image, now and at the linearization point.
+struct PatternBrightness {
+  float gain = 1.0F, bias = 0.0F;
+  float frozen_gain = 1.0F, frozen_host_b = 0.0F;
+};
+
+/// Samples a projected pattern: `gram`, `gram_r`, `rr` and `raw_energy` of `out`.
+void sum_pattern(const ImageF& image, const PatternBrightness& brightness, const Point& point,
+                 const WindowConfig& config, const PatternProjection& at, LinearizedResidual* out);
+
 /// Both halves: linearizes the residual of `point` (host keyframe index `host`) into keyframe index
 /// `target`.
 float linearize(const Window& window, const WindowConfig& config, int host, int target,

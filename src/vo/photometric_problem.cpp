@@ -6,6 +6,7 @@
 
 #include "sovo/image/lanes.h"
 #include "sovo/vo/linearization.h"
+#include "sovo/vo/static_residual.h"
 
 namespace sovo {
 
@@ -91,6 +92,7 @@ PhotometricProblem::PhotometricProblem(const WindowConfig& config, std::vector<P
   }
   sums_.resize(blocks_.size());
   sampled_.resize(first_.back());
+  if (window->rig() != nullptr) sampled_statics_.resize(points_.size());
 }
 
 /// A pixel of parallax or less is lost in blur, and in what else moves all points of an image
@@ -113,8 +115,10 @@ WindowLinearization PhotometricProblem::stored() const {
   WindowLinearization out;
   out.residuals.reserve(first_.back());
   out.depths.reserve(points_.size());
+  out.statics.reserve(points_.size());
   for (const PointRef& ref : points_) {
     out.depths.push_back({ref.point->hessian, ref.point->gradient});
+    out.statics.push_back({.state = ref.point->static_state});
     for (int t = 0; t < window_->size(); ++t) {
       const Residual& r = ref.point->residuals[static_cast<std::size_t>((*window_)[t].slot)];
       if (r.state == ResidualState::kAbsent) continue;
@@ -191,6 +195,11 @@ void PhotometricProblem::linearize_block(const Block& block, const WindowLineari
         depth.add(out->residuals[k]);
         residuals[count++] = {target, r};
       }
+      if (request.statics && known.statics[i].state != ResidualState::kAbsent) {
+        evaluate_static(block, i, known.statics[i], &out->statics[i]);
+        *energy += static_cast<double>(out->statics[i].energy);
+        depth.add(out->statics[i]);
+      }
       out->depths[i] = depth;
       if (request.system) {
         // What is folded into the prior is the information as it is.
@@ -233,6 +242,45 @@ const LinearizedResidual* PhotometricProblem::evaluate(const Block& block, std::
   return &at.linearized;
 }
 
+StoredStatic PhotometricProblem::stored_static(const Keyframe& host,
+                                               const LinearizedResidual& r) const {
+  StoredStatic out;
+  out.state = r.state;
+  if (r.state == ResidualState::kOutOfView) return out;
+  const auto weight = static_cast<float>(config_.static_weight);
+  const DepthPart part = depth_part(r);
+  out.raw_energy = r.raw_energy;
+  out.depth = {weight * part.hessian, weight * part.gradient};
+  out.textured = is_textured(r);
+  const Verdict verdict = judge(host, host, r.raw_energy, out.textured);
+  out.state = verdict.state;
+  out.energy = weight * verdict.energy;
+  return out;
+}
+
+void PhotometricProblem::evaluate_static(const Block& block, std::size_t point,
+                                         const StoredStatic& known, StoredStatic* out) {
+  *out = known;
+  if (known.state == ResidualState::kOutOfView) return;
+  SampledResidual& at = sampled_statics_[point];
+  const Point& p = *points_[point].point;
+  const Keyframe& host = (*window_)[block.host];
+  const auto rho_change = static_cast<float>(p.rho - at.rho);
+  const PatternShift shift = {at.linearized.du_rho * rho_change, at.linearized.dv_rho * rho_change,
+                              0.0F, 0.0F};
+  const auto limit = static_cast<float>(config_.resample_px);
+  if (at.linearization >= 0 && shift.u * shift.u + shift.v * shift.v <= limit * limit) {
+    LinearizedResidual moved = at.linearized;
+    move_residual(shift, &moved);
+    *out = stored_static(host, moved);
+    return;
+  }
+  linearize_static(*window_->rig(), config_, host, p, &at.linearized);
+  at.rho = p.rho;
+  at.linearization = at.linearized.state == ResidualState::kOutOfView ? -1 : 0;
+  *out = stored_static(host, at.linearized);
+}
+
 void PhotometricProblem::linearize(const WindowLinearization& known, const Request& request,
                                    WindowLinearization* out) {
   if (out->residuals.size() != known.residuals.size()) *out = known;
@@ -267,6 +315,14 @@ void PhotometricProblem::reclassify(WindowLinearization* at) const {
         r.state = verdict.state;
         r.energy = verdict.energy;
         depth.add(r);
+      }
+      StoredStatic& s = at->statics[i];
+      if (s.state == ResidualState::kIn || s.state == ResidualState::kOutlier) {
+        const Keyframe& host = (*window_)[block.host];
+        const Verdict verdict = judge(host, host, s.raw_energy, s.textured);
+        s.state = verdict.state;
+        s.energy = static_cast<float>(config_.static_weight) * verdict.energy;
+        depth.add(s);
       }
       at->depths[i] = depth;
     }
@@ -319,6 +375,7 @@ void PhotometricProblem::write_back(const WindowLinearization& from) {
     Point& p = *points_[i].point;
     p.hessian = from.depths[i].hessian;
     p.gradient = from.depths[i].gradient;
+    p.static_state = from.statics[i].state;
     for (std::size_t k = first_[i]; k < first_[i + 1]; ++k) {
       const StoredResidual& r = from.residuals[k];
       p.residuals[static_cast<std::size_t>((*window_)[r.target].slot)] = known_residual(r);

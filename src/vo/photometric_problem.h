@@ -46,9 +46,24 @@ struct SampledResidual {
   int linearization = -1;  ///< Which one that was; -1: none, or out of view.
 };
 
+/// What is kept of a point's linearized residual in its host's right image.
+struct StoredStatic {
+  float energy = 0.0F;  ///< As it counts, weighted.
+  float raw_energy = 0.0F;
+  DepthPart depth{};  ///< Weighted; counts where the residual is an inlier.
+  ResidualState state = ResidualState::kAbsent;
+  bool textured = false;
+};
+
 /// A point's own H_rho_rho and b_rho.
 struct PointDepth {
   double hessian = 0.0, gradient = 0.0;
+
+  void add(const StoredStatic& r) {
+    if (r.state != ResidualState::kIn) return;
+    hessian += static_cast<double>(r.depth.hessian);
+    gradient += static_cast<double>(r.depth.gradient);
+  }
 
   /// Adds the part of an inlier.
   void add(const StoredResidual& r) {
@@ -61,6 +76,7 @@ struct PointDepth {
 /// All residuals of some points, linearized.
 struct WindowLinearization {
   AlignedVector<StoredResidual> residuals;  ///< By point.
+  std::vector<StoredStatic> statics;        ///< Of each point.
   std::vector<PointDepth> depths;
   NormalEquations system;
   double energy = 0.0;
@@ -82,6 +98,7 @@ class PhotometricProblem {
     /// Move residuals to the frozen poses; the depths keep their present values as linearization
     /// point.
     bool at_frozen_poses = false;
+    bool statics = true;  ///< Whether residuals into right images are linearized.
     /// Bit i: whether residuals into keyframe i are linearized; others stay as they are in `out`.
     std::uint32_t targets = std::numeric_limits<std::uint32_t>::max();
   };
@@ -132,6 +149,10 @@ class PhotometricProblem {
   const LinearizedResidual* evaluate(const Block& block, std::size_t point, std::size_t residual,
                                      const StoredResidual& known, const Step& step,
                                      LinearizedResidual* moved);
+  /// The static residual of a point, sampled or moved as others are.
+  void evaluate_static(const Block& block, std::size_t point, const StoredStatic& known,
+                       StoredStatic* out);
+  StoredStatic stored_static(const Keyframe& host, const LinearizedResidual& r) const;
   void linearize_block(const Block& block, const WindowLinearization& known, const Request& request,
                        WindowLinearization* out, HostSums* sums, double* energy);
 
@@ -144,9 +165,10 @@ class PhotometricProblem {
   WorkerPool* pool_;
   std::vector<std::size_t> first_;  ///< First residual of each point, and one past the last.
   std::vector<Block> blocks_;
-  std::vector<HostSums> sums_;            ///< Of each block.
-  std::vector<SampledResidual> sampled_;  ///< Every residual.
-  std::vector<VecX> states_;              ///< Of the keyframes, at each linearization.
+  std::vector<HostSums> sums_;                    ///< Of each block.
+  std::vector<SampledResidual> sampled_;          ///< Every residual.
+  std::vector<SampledResidual> sampled_statics_;  ///< Of each point.
+  std::vector<VecX> states_;                      ///< Of the keyframes, at each linearization.
   /// Relative displacement of each pair since each linearization.
   std::vector<std::vector<std::array<float, 8>>> moved_;
   std::vector<Vec8> shifts_;  ///< From the frozen poses to the current ones, for `at_frozen_poses`.

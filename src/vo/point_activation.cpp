@@ -232,6 +232,7 @@ void PointActivator::optimize(const Window& window, double mean_rho, Candidate* 
     p.residuals[static_cast<std::size_t>(window[t].slot)] = {ResidualState::kIn, r.raw_energy,
                                                              r.centre_u, r.centre_v, r.centre_rho};
   }
+  if (host.right) p.static_state = ResidualState::kIn;
   candidate->discard = true;  // the immature point goes, as an active one or for good
   // What most keyframes deny moves by itself, a car ahead: stereo knows its depth, the map has no
   // place for it.

@@ -60,6 +60,23 @@ void Window::renumber() {
   for (int i = 0; i < size(); ++i) slot_index_[static_cast<std::size_t>((*this)[i].slot)] = i;
 }
 
+void Window::clear() {
+  keyframes_.clear();
+  prior_ = Prior();
+  scale_held_ = false;
+  renumber();
+}
+
+void Window::update_scale_held() {
+  constexpr std::ptrdiff_t kFewest = 50;
+  std::ptrdiff_t residuals = 0;
+  for (const auto& k : keyframes_) {
+    residuals += std::count_if(k->points.begin(), k->points.end(),
+                               [](const Point& p) { return p.static_state == ResidualState::kIn; });
+  }
+  scale_held_ = scale_held_ || residuals >= kFewest;
+}
+
 int Window::index_of(std::uint32_t id) const {
   for (int i = 0; i < size(); ++i) {
     if ((*this)[i].id == id) return i;

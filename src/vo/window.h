@@ -3,10 +3,12 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "sovo/geometry/camera_model.h"
 #include "sovo/geometry/se3.h"
+#include "sovo/geometry/stereo_rig.h"
 #include "sovo/image/pyramid.h"
 #include "sovo/vo/immature_point.h"
 #include "sovo/vo/pattern.h"
@@ -59,6 +61,8 @@ struct Point {
   bool remove = false;
   bool in_snapshot = false;                     ///< Was part of the last snapshot.
   std::array<Residual, kMaxSlots> residuals{};  ///< By target slot.
+  /// Of the residual in the host's right image, where static residuals take part.
+  ResidualState static_state = ResidualState::kAbsent;
   /// States in the newest keyframe and the one before (for the rules of removal).
   ResidualState last_state = ResidualState::kAbsent;
   ResidualState last_but_one_state = ResidualState::kAbsent;
@@ -87,6 +91,8 @@ struct Keyframe {
   std::int64_t stamp_ns = 0;
   double exposure_s = 0.0;
   ImagePyramidPtr pyramid;
+  ImagePyramidPtr right;                ///< Raw, of the same instant; null: no static residuals.
+  BrightnessTransfer right_brightness;  ///< From this keyframe's image to `right`.
 
   SE3 frozen_T_camera_world;
   Affine frozen_affine;
@@ -136,12 +142,25 @@ class Window {
   explicit Window(const CameraModel& camera) : camera_(camera) {}
 
   const CameraModel& camera() const { return camera_; }
+
+  /// Static residuals into a right camera take part: they hold the scale. `rig.left` is `camera()`.
+  void set_rig(const StereoRig& rig) { rig_ = rig; }
+  /// Null without static residuals.
+  const StereoRig* rig() const { return rig_ ? &*rig_ : nullptr; }
+  /// Whether static residuals, present or folded into the prior, hold the scale: then it is no
+  /// gauge direction.
+  bool scale_held() const { return scale_held_; }
+  /// From fifty static residuals on they hold the scale.
+  void update_scale_held();
   int size() const { return static_cast<int>(keyframes_.size()); }
   bool empty() const { return keyframes_.empty(); }
   Keyframe& operator[](int i) { return *keyframes_[static_cast<std::size_t>(i)]; }
   const Keyframe& operator[](int i) const { return *keyframes_[static_cast<std::size_t>(i)]; }
   Keyframe& newest() { return *keyframes_.back(); }
   const Keyframe& newest() const { return *keyframes_.back(); }
+
+  /// Forgets keyframes and prior.
+  void clear();
 
   /// Appends a keyframe, gives it a free slot and zero rows in the prior. Returns it.
   Keyframe& insert(std::unique_ptr<Keyframe> keyframe);
@@ -183,6 +202,8 @@ class Window {
   void renumber();
 
   CameraModel camera_;
+  std::optional<StereoRig> rig_;
+  bool scale_held_ = false;
   std::vector<std::unique_ptr<Keyframe>> keyframes_;
   std::array<int, kMaxSlots> slot_index_{};
   Prior prior_;

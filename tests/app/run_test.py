@@ -48,6 +48,21 @@ class Accuracy(CommandTest):
         self.assertEqual(len(poses), FRAMES)
         self.assertLess(largest_error(poses, read_tum(TRUTH), poses[0][0]), TOLERANCE_M)
 
+    def test_mode_stereo(self):
+        keyframes = self.folder / "keyframes.csv"
+        poses = self.run_with("--deterministic", "--mode", "stereo", "--keyframes", keyframes)
+        self.assertEqual(len(poses), FRAMES)
+        self.assertLess(largest_error(poses, read_tum(TRUTH), poses[0][0]), TOLERANCE_M)
+        rows = [line.split(",") for line in keyframes.read_text().splitlines()[1:]]
+        self.assertTrue(rows)
+        # The optimizer watches, and finds nothing to correct.
+        self.assertEqual({(float(row[1]), row[3]) for row in rows}, {(0.0, "accepted")})
+
+    def test_mode_stereo_is_deterministic_too(self):
+        a = self.run_with("--deterministic", "--mode", "stereo", "--threads", 1)
+        b = self.run_with("--deterministic", "--mode", "stereo", "--threads", 2)
+        self.assertEqual(a, b)
+
     def test_reverse_writes_the_stamps_of_the_dataset(self):
         poses = self.run_with("--reverse", "--deterministic")
         stamps = [stamp for stamp, _, _ in poses]

@@ -164,6 +164,57 @@ TEST(StereoOdometry, MonoModeClaimsNoScale) {
   expect_follows_the_drive(run.odometry.refined_trajectory(), 0.02, 0.06);
 }
 
+TEST(StereoOdometry, StaticResidualsHoldTheScaleInModeStereo) {
+  StereoOdometryConfig config = test_config();
+  config.mode = OdometryMode::kStereo;
+  Playback run(config);
+  run.give_drive(0, kDriveFrames);
+  run.odometry.finish();
+  for (const OdometryOutput& o : run.recorder.frames) {
+    EXPECT_TRUE(o.scale_valid);
+    EXPECT_EQ(o.state, OdometryState::kTracking) << o.reason;
+    EXPECT_EQ(o.log_scale, 0.0) << "no similarity";
+    EXPECT_GT(o.log_scale_sigma, 0.0);
+  }
+  EXPECT_GE(run.recorder.scales.size(), 3U);
+  for (const ScaleRecord& r : run.recorder.scales) {
+    EXPECT_EQ(r.correction, 0.0);
+    EXPECT_EQ(r.verdict, ScaleVerdict::kAccepted);
+    EXPECT_LT(std::abs(r.measured), 0.03) << "what the optimizer sees agrees";
+  }
+  const OdometryOutput& last = run.recorder.frames.back();
+  EXPECT_LT(last.log_scale_sigma, 0.01);
+  EXPECT_GT(last.pose_covariance.diagonal().minCoeff(), 0.0);
+  expect_follows_the_drive(published(run.recorder), 0.015, 0.02);
+  expect_follows_the_drive(run.odometry.refined_trajectory(), 0.015, 0.02);
+}
+
+TEST(StereoOdometry, StaticResidualsBringBackAWrongScaleAtTheStart) {
+  StereoOdometryConfig config = test_config();
+  config.mode = OdometryMode::kStereo;
+  Playback run(config);
+  run.give(first_frame_of_narrow_rig(0.97));
+  run.give_drive(1, kDriveFrames);
+  const auto trajectory = run.odometry.refined_trajectory();
+  const std::vector<TrajectoryPose> second_half(trajectory.begin() + kDriveFrames / 2,
+                                                trajectory.end());
+  EXPECT_NEAR(drive_error(second_half).scale, 1.0, 0.02);
+}
+
+TEST(StereoOdometry, ModeStereoBeginsFromTwoViewsToo) {
+  StereoOdometryConfig config = test_config();
+  config.mode = OdometryMode::kStereo;
+  config.init = InitMethod::kTwoView;
+  Playback run(config);
+  for (int i = 0; i < 2 * kDriveFrames && run.recorder.scales.size() < 6; ++i)
+    run.give(drive_frame(i));
+  ASSERT_TRUE(run.recorder.frames.back().scale_valid) << run.recorder.frames.back().reason;
+  const auto corrections = std::count_if(run.recorder.scales.begin(), run.recorder.scales.end(),
+                                         [](const ScaleRecord& r) { return r.correction != 0.0; });
+  EXPECT_EQ(corrections, 1) << "the cold start gives the map its unit; then residuals hold it";
+  expect_follows_the_drive(run.odometry.refined_trajectory(), 0.02, 0.05);
+}
+
 TEST(StereoOdometry, TwoViewStartFindsItsScale) {
   StereoOdometryConfig config = test_config();
   config.init = InitMethod::kTwoView;

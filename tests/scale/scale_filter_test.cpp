@@ -67,6 +67,65 @@ TEST(ScaleFilter, ConvergesToTheScale) {
   EXPECT_LT(filter.sigma(), 0.004);
 }
 
+TEST(ScaleFilter, AWindowThatKeepsItsScaleIsOnlyWatched) {
+  ScaleFilter filter = locked_filter();
+  const double variance = 1e-6;
+  for (int i = 1; i <= 20; ++i) {
+    ScaleMeasurement m = measure(0.01, 0.001);  // a calibration that does not quite fit
+    m.stamp_ns = i;
+    const ScaleUpdate update = filter.watch(m, variance);
+    EXPECT_FALSE(update.apply);
+    EXPECT_EQ(update.verdict, ScaleVerdict::kAccepted);
+  }
+  EXPECT_FALSE(filter.wants_cold_start());
+  EXPECT_DOUBLE_EQ(filter.sigma(), 1e-3);
+  EXPECT_DOUBLE_EQ(filter.path_sigma(), 1e-3);
+  EXPECT_NEAR(filter.age_s(20 + 1'000'000'000), 1.0, 1e-12);
+}
+
+TEST(ScaleFilter, AWatchedWindowWithAnotherScaleIsPutRightByAColdStart) {
+  ScaleFilter filter = locked_filter();
+  const double variance = 1e-6;
+  int disagreements = 0;
+  while (!filter.wants_cold_start() && disagreements < 10) {
+    const ScaleUpdate update = filter.watch(measure(0.25, 0.002), variance);
+    EXPECT_FALSE(update.apply);
+    EXPECT_EQ(update.verdict, ScaleVerdict::kInnovation);
+    EXPECT_GT(filter.sigma(), 0.02) << "either may be right";
+    ++disagreements;
+  }
+  EXPECT_EQ(disagreements, ScaleFilterConfig().cold_start_after_agreeing);
+  EXPECT_EQ(filter.watch(measure(0.25, 0.002, true, ScaleVerdict::kAmbiguous), variance).verdict,
+            ScaleVerdict::kAmbiguous);
+  const ScaleUpdate update = filter.watch(measure(0.25, 0.002, true), variance);
+  EXPECT_TRUE(update.apply);
+  EXPECT_DOUBLE_EQ(update.log_scale_correction, 0.25);
+  EXPECT_EQ(update.verdict, ScaleVerdict::kAccepted);
+  EXPECT_FALSE(filter.wants_cold_start());
+}
+
+TEST(ScaleFilter, WhatCannotBeSeenSpeaksNotAgainstAWatchedWindow) {
+  ScaleFilter filter = locked_filter();
+  for (int i = 0; i < 20; ++i) {
+    const ScaleVerdict verdict =
+        filter.watch(measure(0.0, 0.0, false, ScaleVerdict::kUnobservable), 1e-6).verdict;
+    EXPECT_EQ(verdict, ScaleVerdict::kUnobservable);
+  }
+  EXPECT_EQ(filter.disagreements(), 0);
+  EXPECT_FALSE(filter.wants_cold_start());
+  for (int i = 0; i < 20; ++i) {
+    filter.watch(measure(0.0, 0.002, false, ScaleVerdict::kTooFewInliers), 1e-6);
+  }
+  EXPECT_TRUE(filter.wants_cold_start());
+}
+
+TEST(ScaleFilter, AWatchedFilterLocksAsAnyOther) {
+  ScaleFilter filter({});
+  EXPECT_FALSE(filter.watch(measure(0.3, 0.001), 0.0).apply);
+  EXPECT_TRUE(filter.watch(measure(1.7, 0.002, true), 0.0).apply);
+  EXPECT_TRUE(filter.locked());
+}
+
 TEST(ScaleFilter, PendingCorrectionsAreNotAppliedTwice) {
   ScaleFilter filter = locked_filter();
   const double first = filter.update(measure(0.02, 0.001)).log_scale_correction;

@@ -122,7 +122,7 @@ TEST_F(Map, GrowsAlongADriveAndKeepsItsScaleInEverySimilarity) {
     const Vec3 expected = scale * drive(i).translation() + shift;
     EXPECT_LT((tracked.T_world_camera.translation() - expected).norm(), 0.03 * scale)
         << "frame " << i;
-    const MapResult result = vo_.map(tracked, nullptr, nullptr);
+    const MapResult result = vo_.map(tracked, {}, nullptr);
     ASSERT_FALSE(result.failed);
     keyframes += result.is_keyframe ? 1 : 0;
     if (i == 12 || i == 18) {
@@ -151,7 +151,7 @@ TEST_F(Map, CovarianceIsCarriedOverEachStepAndGrowsByIt) {
   Vec3 position = vo_.reference()->T_world_camera.translation();
   int steps = 0;
   for (int i = 1; i <= 36; ++i) {
-    const MapResult result = vo_.map(vo_.track(frame_at(scene_, drive(i), i)), nullptr, nullptr);
+    const MapResult result = vo_.map(vo_.track(frame_at(scene_, drive(i), i)), {}, nullptr);
     if (!result.is_keyframe) continue;
     ++steps;
     const SE3 newest = vo_.reference()->T_world_camera;
@@ -169,7 +169,7 @@ TEST_F(Map, CovarianceIsCarriedOverEachStepAndGrowsByIt) {
 
 TEST_F(Map, BeginsAnewWithoutWhatItHeld) {
   for (int i = 1; i <= 10; ++i) {
-    vo_.map(vo_.track(frame_at(scene_, drive(i), i)), nullptr, nullptr);
+    vo_.map(vo_.track(frame_at(scene_, drive(i), i)), {}, nullptr);
   }
   ASSERT_GT(vo_.keyframes().size(), 1U);
   std::vector<StartPoint> points;
@@ -193,7 +193,7 @@ TEST_F(Map, BeginsAnewWithoutWhatItHeld) {
 
 TEST_F(Map, CorrectionCountsLessWhatWasAppliedSinceItsSnapshot) {
   for (int i = 1; !vo_.snapshot() && i < 20; ++i) {
-    vo_.map(vo_.track(frame_at(scene_, drive(i), i)), nullptr, nullptr);
+    vo_.map(vo_.track(frame_at(scene_, drive(i), i)), {}, nullptr);
   }
   ASSERT_TRUE(vo_.snapshot());
   ScaleCorrection late;
@@ -209,7 +209,7 @@ TEST_F(Map, CorrectionCountsLessWhatWasAppliedSinceItsSnapshot) {
 TEST_F(Map, SnapshotShowsTheTrueDepths) {
   int last = 0;
   for (int i = 1; i <= 14; ++i) {
-    const MapResult r = vo_.map(vo_.track(frame_at(scene_, drive(i), i)), nullptr, nullptr);
+    const MapResult r = vo_.map(vo_.track(frame_at(scene_, drive(i), i)), {}, nullptr);
     if (r.is_keyframe) last = i;
   }
   ASSERT_TRUE(vo_.snapshot());
@@ -245,7 +245,7 @@ TEST(DirectOdometryThreads, ChangeNoBit) {
     for (std::size_t i = 1; i < frames.size(); ++i) {
       const TrackedFrame tracked = vo.track(frames[i]);
       poses[threads - 1].push_back(tracked.T_world_camera.matrix());
-      vo.map(tracked, nullptr, nullptr);
+      vo.map(tracked, {}, nullptr);
     }
   }
   ASSERT_EQ(poses[0].size(), 10U);

@@ -18,7 +18,7 @@ namespace sovo::app {
 enum class Preset {
   kEmbedded,  ///< Small computers: 800 points, 5 keyframes.
   kDefault,   ///< 2000 points, 7 keyframes.
-  kQuality,   ///< The same with more new points and iterations of bundle adjustment.
+  kQuality,   ///< The same with more new points and iterations, and static residuals (mode stereo).
 };
 
 /// What the inner loops must compute. There is one answer: whatever registers they use, they give

@@ -1,6 +1,8 @@
 #include "sovo/app/config_options.h"
 
 #include <algorithm>
+#include <string>
+#include <utility>
 
 #include "sovo/app/frame_input.h"
 #include "sovo/io/yaml_config.h"
@@ -11,10 +13,32 @@ namespace {
 std::vector<std::string> preset_assignments(Preset preset) {
   if (preset == Preset::kDefault) return {};
   if (preset == Preset::kQuality) {
-    return {"vo.points.immature_points=700", "vo.window.max_iterations=10"};
+    return {"mode=stereo", "vo.points.immature_points=700", "vo.window.max_iterations=10"};
   }
   return {"vo.points.active_points=800", "vo.points.immature_points=250",
           "vo.keyframe.max_keyframes=5", "vo.keyframe.min_keyframes=4"};
+}
+
+/// Weights of the odometry: a negative one would turn its term's meaning round.
+Result<void> check_weights(const DirectConfig& vo) {
+  const KeyframeConfig& keyframe = vo.keyframe;
+  const WindowConfig& window = vo.window;
+  const std::pair<const char*, double> weights[] = {
+      {"keyframe.flow_translation", keyframe.flow_translation},
+      {"keyframe.flow_total", keyframe.flow_total},
+      {"keyframe.max_translation_flow", keyframe.max_translation_flow},
+      {"keyframe.approach", keyframe.approach},
+      {"keyframe.brightness", keyframe.brightness},
+      {"keyframe.rmse_min_score", keyframe.rmse_min_score},
+      {"window.folding_weight", window.folding_weight},
+      {"window.depth_damping", window.depth_damping},
+      {"window.static_weight", window.static_weight},
+      {"window.prior_a", window.prior_a},
+      {"window.prior_b", window.prior_b}};
+  for (const auto& [key, weight] : weights) {
+    if (!(weight >= 0.0)) return Error{std::string("vo.") + key + " must not be negative"};
+  }
+  return {};
 }
 
 Result<void> apply_all(const std::vector<std::string>& assignments, AppConfig* config) {
@@ -100,6 +124,7 @@ Result<void> check_config(const AppConfig& config) {
   if (config.odometry.threads < 1) return Error{"threads must be at least 1"};
   if (config.odometry.downscale < 1) return Error{"downscale must be at least 1"};
   if (config.odometry.mapping_queue < 1) return Error{"mapping_queue must be at least 1"};
+  if (auto weights = check_weights(config.odometry.vo); !weights) return weights;
   if (!(config.node.idle_exit_s >= 0.0)) return Error{"node.idle_exit_s must not be negative"};
   if (config.node.left.empty() != config.node.right.empty()) {
     return Error{"node.left and node.right (--left, --right) are given together"};

@@ -38,7 +38,8 @@ class Configuration(CommandTest):
 
     def test_wrong_values_are_refused(self):
         for assignment in ["mode=fast", "threads=many", "threads=0", "camera.rate=-1",
-                           "camera.start=-1", "no.such.key=1", "mode"]:
+                           "camera.start=-1", "no.such.key=1", "mode",
+                           "vo.keyframe.approach=-1", "vo.window.static_weight=nan"]:
             with self.subTest(assignment=assignment):
                 self.expect(sovo("--set", assignment, "config"), USAGE)
 
@@ -65,7 +66,10 @@ class Configuration(CommandTest):
                              for old, new in zip(default[1:], dump[1:]) if old != new]
         self.assertEqual(changed["default"], [])
         self.assertIn("active_points: 800", changed["embedded"])
-        self.assertEqual(changed["quality"], ["immature_points: 700", "max_iterations: 10"])
+        self.assertEqual(changed["quality"],
+                         ["mode: stereo", "immature_points: 700", "max_iterations: 10"])
+        named = self.expect(sovo("config", "--preset", "quality", "--set", "mode=scale"), OK).stdout
+        self.assertIn("\nmode: scale ", named)
         for refused in (sovo("config", "--preset", "fast"),
                         sovo("config", "--config", self.file("preset: fast\n"))):
             self.expect(refused, USAGE)

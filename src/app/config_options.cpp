@@ -6,6 +6,7 @@
 
 #include "sovo/app/frame_input.h"
 #include "sovo/io/yaml_config.h"
+#include "sovo/vo/pattern.h"
 
 namespace sovo::app {
 namespace {
@@ -37,6 +38,27 @@ Result<void> check_weights(const DirectConfig& vo) {
       {"window.prior_b", window.prior_b}};
   for (const auto& [key, weight] : weights) {
     if (!(weight >= 0.0)) return Error{std::string("vo.") + key + " must not be negative"};
+  }
+  return {};
+}
+
+/// What the selection of pixels could not work with.
+Result<void> check_selection(const PixelSelectorConfig& s) {
+  constexpr int kLeastRegion = 8;
+  if (s.threshold_block < kLeastRegion) {
+    return Error{"vo.selection.threshold_block must be at least 8"};
+  }
+  if (s.border <= kPatternBorder) return Error{"vo.selection.border must be at least 4"};
+  if (s.mask_border < 0) return Error{"vo.selection.mask_border must not be negative"};
+  if (s.initial_block < 1) return Error{"vo.selection.initial_block must be at least 1"};
+  if (!(s.least_offset > 0.0 && s.least_offset <= s.threshold_offset)) {
+    return Error{"vo.selection.least_offset must be positive and at most threshold_offset"};
+  }
+  if (!(s.level_threshold_1 > 0.0 && s.level_threshold_2 > 0.0)) {
+    return Error{"vo.selection.level_threshold_1 and _2 must be positive"};
+  }
+  if (!(s.reselect_below > 0.0 && s.reselect_below < 1.0 && s.reselect_above > 1.0)) {
+    return Error{"vo.selection.reselect_below must be between 0 and 1, reselect_above above 1"};
   }
   return {};
 }
@@ -125,6 +147,7 @@ Result<void> check_config(const AppConfig& config) {
   if (config.odometry.downscale < 1) return Error{"downscale must be at least 1"};
   if (config.odometry.mapping_queue < 1) return Error{"mapping_queue must be at least 1"};
   if (auto weights = check_weights(config.odometry.vo); !weights) return weights;
+  if (auto selection = check_selection(config.odometry.vo.selection); !selection) return selection;
   if (!(config.node.idle_exit_s >= 0.0)) return Error{"node.idle_exit_s must not be negative"};
   if (config.node.left.empty() != config.node.right.empty()) {
     return Error{"node.left and node.right (--left, --right) are given together"};

@@ -168,7 +168,7 @@ bool MapSegment::initialize_from_two_views(const MonoFrame& frame, const SideIma
     }
   }
   two_view_initializer_ = std::make_unique<TwoViewInitializer>();
-  PixelSelectorConfig selector;
+  PixelSelectorConfig selector = config_.vo.selection;
   selector.seed = config_.seed + 1;
   two_view_selector_ = std::make_unique<PixelSelector>(selector);
   const ImageU8& mask = preparation_.left_mask();

@@ -1,5 +1,7 @@
 #pragma once
 
+#include "sovo/vo/pixel_selector.h"
+
 namespace sovo {
 
 /// Coarse-to-fine tracking of every frame against the newest keyframe.
@@ -148,6 +150,7 @@ struct WindowConfig {
 struct DirectConfig {
   TrackerConfig tracker;
   KeyframeConfig keyframe;
+  PixelSelectorConfig selection;
   PointConfig points;
   WindowConfig window;
 
@@ -155,6 +158,7 @@ struct DirectConfig {
   void visit(Visitor& v) {
     v("tracker", tracker, "tracking of every frame");
     v("keyframe", keyframe, "keyframe decision and window size");
+    v("selection", selection, "choice of the pixels that become points");
     v("points", points, "immature points");
     v("window", window, "bundle adjustment");
   }

@@ -40,8 +40,7 @@ class StageTimer {
   std::chrono::steady_clock::time_point start_;
 };
 
-PixelSelectorConfig selector_config(int seed) {
-  PixelSelectorConfig config;
+PixelSelectorConfig selector_config(PixelSelectorConfig config, int seed) {
   config.seed = seed + 1;
   return config;
 }
@@ -109,7 +108,7 @@ DirectOdometry::DirectOdometry(const DirectConfig& config, const CameraModel& ca
       num_levels_(
           ImagePyramid::num_levels_for(camera.width, camera.height, config.tracker.max_levels)),
       window_(camera),
-      selector_(selector_config(seed)),
+      selector_(selector_config(config.selection, seed)),
       activator_(config.points, config.window, pool),
       adjuster_(config.window, pool),
       epoch_log_scale_{0.0},

@@ -20,7 +20,8 @@ struct PixelSelectorConfig {
   double reselect_below = 0.8;      ///< Select anew when fewer than this times the wanted number,
   double reselect_above = 4.0;      ///< or more than this times it, were found.
   int initial_block = 3;            ///< First side of the blocks of which each gives one pixel.
-  int seed = 1;                     ///< Of the directions and of the thinning.
+  /// Of the directions and of the thinning; follows from that of the whole odometry.
+  int seed = 1;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -34,7 +35,6 @@ struct PixelSelectorConfig {
     v("reselect_below", reselect_below, "select anew below this share of the wanted number");
     v("reselect_above", reselect_above, "select anew above this multiple of the wanted number");
     v("initial_block", initial_block, "first side of the selection blocks [px]");
-    v("seed", seed, "seed of directions and thinning");
   }
 };
 

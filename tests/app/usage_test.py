@@ -39,7 +39,8 @@ class Configuration(CommandTest):
     def test_wrong_values_are_refused(self):
         for assignment in ["mode=fast", "threads=many", "threads=0", "camera.rate=-1",
                            "camera.start=-1", "no.such.key=1", "mode",
-                           "vo.keyframe.approach=-1", "vo.window.static_weight=nan"]:
+                           "vo.keyframe.approach=-1", "vo.window.static_weight=nan",
+                           "vo.selection.border=3", "vo.selection.least_offset=8"]:
             with self.subTest(assignment=assignment):
                 self.expect(sovo("--set", assignment, "config"), USAGE)
 

@@ -335,8 +335,7 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
     if (stereo()) vo_.use_static_residuals(preparation_.rig());
   }
   if (was_locked) {
-    // Where static residuals hold the scale, its errors are in the poses' own covariance.
-    extend_scale_path(position, stereo() ? 0.0 : sigma_before);
+    extend_scale_path(position, sigma_before);
   } else if (filter_.locked()) {
     // All that was built before took this scale at once, about the newest keyframe.
     scale_path_covariance_.setZero();

@@ -71,11 +71,12 @@ ScaleUpdate ScaleFilter::update(const ScaleMeasurement& m) {
 
 ScaleUpdate ScaleFilter::watch(const ScaleMeasurement& m, double variance) {
   if (!locked_) return update(m);
-  variance_ = path_variance_ = variance;
+  variance_ = std::min(variance, square(kLargestDrift));
+  path_variance_ = variance_ * correlation_growth(config_.max_correlation);  // it changes slowly
   ScaleUpdate update;
   update.verdict = m.estimate.verdict;
   update.innovation = m.estimate.log_scale - m.pending_log_scale;
-  const double doubted = variance + measured_variance(m) + square(kLargestDrift);
+  const double doubted = variance_ + measured_variance(m) + square(kLargestDrift);
   update.nis = square(update.innovation) / doubted;
   if (is_miss(update.verdict)) {
     miss(m.estimate);

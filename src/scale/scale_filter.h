@@ -90,9 +90,9 @@ class ScaleFilter {
 
   ScaleUpdate update(const ScaleMeasurement& measurement);
 
-  /// The same for a window that keeps its scale by itself, with this variance of log-scale: a
-  /// measurement corrects nothing, unless many disagree by more than what moves a scale (5 %), and
-  /// a cold start then finds it elsewhere.
+  /// The same for a window that keeps its scale by itself, with this variance of log-scale, which
+  /// counts as 0.05 squared at most: a measurement corrects nothing, unless many disagree by more
+  /// than what moves a scale (5 %), and a cold start then finds it elsewhere.
   ScaleUpdate watch(const ScaleMeasurement& measurement, double variance);
 
   bool locked() const { return locked_; }

@@ -200,37 +200,28 @@ void BundleAdjuster::drop_bad_residuals(Window* window) const {
   }
 }
 
-/// The system of all states but the pose of keyframe `fixed`, in state units.
-MatX BundleAdjuster::without_pose(const Window& window, const MatX& H, int fixed) {
-  std::vector<Eigen::Index> free;
-  for (Eigen::Index i = 0; i < 8 * window.size(); ++i) {
-    if (i < 8 * fixed || i >= 8 * fixed + 6) free.push_back(i);
-  }
-  return H(free, free);
-}
-
-/// The scale of the world about a keyframe, in state units.
-VecX BundleAdjuster::scale_direction(const Window& window, int about, const VecX& units) {
-  const Vec3 centre = window[about].T_world_camera().translation();
-  VecX scale = VecX::Zero(units.size());
-  for (int i = 0; i < window.size(); ++i) {
-    scale.segment<3>(8 * i) = window[i].T_camera_world * centre;
-  }
-  return units.cwiseInverse().cwiseProduct(scale);
-}
-
 Mat6 BundleAdjuster::newest_covariance(const Window& window, const NormalEquations& system) const {
   const int newest = window.size() - 1;
   if (newest < 1) return Mat6::Zero();
   const int before = newest - 1;
   const VecX units = state_units(window);
   MatX H = units.asDiagonal() * reduced(window, system, 0.0).H * units.asDiagonal();
-  const VecX scale = scale_direction(window, before, units);
-  if (scale.norm() > 0.0 && !window.scale_held()) {
+  // The scale of the world about the keyframe before; the pose of that is left out below.
+  const Vec3 centre = window[before].T_world_camera().translation();
+  VecX scale = VecX::Zero(H.rows());
+  for (int i = 0; i <= newest; ++i) {
+    scale.segment<3>(8 * i) = window[i].T_camera_world * centre;
+  }
+  scale = units.cwiseInverse().cwiseProduct(scale);
+  if (scale.norm() > 0.0) {
     const double held = H.diagonal().segment<8>(8 * newest).maxCoeff();
     H += held * scale * scale.transpose() / scale.squaredNorm();
   }
-  const MatX A = without_pose(window, H, before);
+  std::vector<Eigen::Index> free;
+  for (Eigen::Index i = 0; i < H.rows(); ++i) {
+    if (i < 8 * before || i >= 8 * before + 6) free.push_back(i);
+  }
+  const MatX A = H(free, free);
   const Eigen::Index n = A.rows();
   MatX columns = MatX::Zero(n, 6);  // of the newest pose: the last eight but its a and b
   columns.block<6, 6>(n - 8, 0).setIdentity();
@@ -241,18 +232,15 @@ Mat6 BundleAdjuster::newest_covariance(const Window& window, const NormalEquatio
   return usable ? Mat6(0.5 * (covariance + covariance.transpose())) : Mat6(Mat6::Zero());
 }
 
-double BundleAdjuster::scale_variance(const Window& window, const NormalEquations& system) const {
-  if (window.size() < 2 || !window.scale_held()) return 0.0;
-  const VecX units = state_units(window);
-  const MatX H = units.asDiagonal() * reduced(window, system, 0.0).H * units.asDiagonal();
-  // Nothing of the scale about the oldest keyframe is in that one's own pose.
-  const VecX all = scale_direction(window, 0, units);
-  const VecX scale = all.tail(all.size() - 6);
-  const double length = scale.squaredNorm();
-  if (length <= 0.0) return 0.0;
-  const MatX solved = solve_symmetric_columns(without_pose(window, H, 0), scale);
-  const double variance = scale.dot(solved.col(0)) / (length * length);
-  return std::isfinite(variance) && variance > 0.0 ? variance : 0.0;
+double BundleAdjuster::scale_information(const WindowLinearization& at,
+                                         const std::vector<PointRef>& points) {
+  double information = 0.0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (at.statics[i].state != ResidualState::kIn) continue;
+    const double rho = points[i].point->rho;
+    information += static_cast<double>(at.statics[i].depth.hessian) * rho * rho;
+  }
+  return information;
 }
 
 NormalEquations BundleAdjuster::iterate(PhotometricProblem* problem, Window* window,
@@ -329,8 +317,11 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   result.gradient_scatter = problem.gradient_scatter(now, static_cast<int>(newest));
   result.newest_covariance =
       keyframe_variance(result.rmse, result.gradient_scatter) * newest_covariance(*window, solved);
-  result.scale_variance =
-      keyframe_variance(result.rmse, result.gradient_scatter) * scale_variance(*window, solved);
+  if (const double information = scale_information(now, problem.points()); information > 0.0) {
+    // Static residuals weigh more than their noise would have it.
+    const double noise = keyframe_variance(result.rmse, result.gradient_scatter);
+    result.scale_variance = config_.static_weight * noise / information;
+  }
   drop_bad_residuals(window);
   return result;
 }

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
+#include <vector>
 
 #include "sovo/vo/direct_config.h"
 #include "sovo/vo/normal_equations.h"
@@ -44,10 +46,10 @@ struct BundleResult {
   bool finite = true;  ///< False: the solve broke down; the window must be thrown away.
   /// Covariance of the newest keyframe's pose as seen from the keyframe before it (left
   /// perturbation of T_newest_before: translation [the window's unit], rotation [rad]), the
-  /// window's scale held, unless static residuals hold it. Of two keyframes or more.
+  /// window's scale held. Of two keyframes or more.
   Mat6 newest_covariance = Mat6::Zero();
-  /// Of the window's log-scale, where static residuals hold it; else 0.
-  double scale_variance = 0.0;
+  /// Of a common factor of all depths, by the static residuals; infinite without any.
+  double scale_variance = std::numeric_limits<double>::infinity();
   double gradient_scatter = 1.0;  ///< Of the residuals into the newest keyframe.
 };
 
@@ -73,9 +75,6 @@ class BundleAdjuster {
   /// tell it.
   Mat6 newest_covariance(const Window& window, const NormalEquations& system) const;
 
-  /// Variance of the log-scale as in `BundleResult`, for residuals of unit noise.
-  double scale_variance(const Window& window, const NormalEquations& system) const;
-
   /// Orthonormal basis of the seven gauge directions (motion and scale of the world; of six where
   /// static residuals hold the scale) at the linearization points, in states divided by
   /// `state_units`.
@@ -95,8 +94,6 @@ class BundleAdjuster {
     MatX H;
     VecX b;
   };
-  static MatX without_pose(const Window& window, const MatX& H, int fixed);
-  static VecX scale_direction(const Window& window, int about, const VecX& units);
   ReducedSystem reduced(const Window& window, const NormalEquations& system, double lambda) const;
   /// Sets the newest keyframe's outlier threshold from the energies of the residuals into it.
   void update_outlier_threshold(const WindowLinearization& linearized, Window* window) const;
@@ -108,6 +105,9 @@ class BundleAdjuster {
   NormalEquations iterate(PhotometricProblem* problem, Window* window, WindowLinearization* now,
                           BundleResult* result) const;
   void drop_bad_residuals(Window* window) const;
+  /// What static residuals that are inliers tell of a common factor of all depths.
+  static double scale_information(const WindowLinearization& at,
+                                  const std::vector<PointRef>& points);
 
   WindowConfig config_;
   WorkerPool* pool_;

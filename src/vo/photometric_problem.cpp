@@ -245,8 +245,6 @@ const LinearizedResidual* PhotometricProblem::evaluate(const Block& block, std::
 StoredStatic PhotometricProblem::stored_static(const Keyframe& host,
                                                const LinearizedResidual& r) const {
   StoredStatic out;
-  out.state = r.state;
-  if (r.state == ResidualState::kOutOfView) return out;
   const auto weight = static_cast<float>(config_.static_weight);
   const DepthPart part = depth_part(r);
   out.raw_energy = r.raw_energy;
@@ -277,8 +275,13 @@ void PhotometricProblem::evaluate_static(const Block& block, std::size_t point,
   }
   linearize_static(*window_->rig(), config_, host, p, &at.linearized);
   at.rho = p.rho;
-  at.linearization = at.linearized.state == ResidualState::kOutOfView ? -1 : 0;
-  *out = stored_static(host, at.linearized);
+  const bool in_view = at.linearized.state != ResidualState::kOutOfView;
+  at.linearization = in_view ? 0 : -1;
+  if (in_view) {
+    *out = stored_static(host, at.linearized);
+  } else {
+    out->state = ResidualState::kOutOfView;  // with the energy that it had: leaving is no gain
+  }
 }
 
 void PhotometricProblem::linearize(const WindowLinearization& known, const Request& request,

@@ -152,6 +152,7 @@ class PhotometricProblem {
   /// The static residual of a point, sampled or moved as others are.
   void evaluate_static(const Block& block, std::size_t point, const StoredStatic& known,
                        StoredStatic* out);
+  /// Of a residual in view.
   StoredStatic stored_static(const Keyframe& host, const LinearizedResidual& r) const;
   void linearize_block(const Block& block, const WindowLinearization& known, const Request& request,
                        WindowLinearization* out, HostSums* sums, double* energy);

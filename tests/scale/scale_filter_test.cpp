@@ -79,7 +79,7 @@ TEST(ScaleFilter, AWindowThatKeepsItsScaleIsOnlyWatched) {
   }
   EXPECT_FALSE(filter.wants_cold_start());
   EXPECT_DOUBLE_EQ(filter.sigma(), 1e-3);
-  EXPECT_DOUBLE_EQ(filter.path_sigma(), 1e-3);
+  EXPECT_GT(filter.path_sigma(), 2e-3) << "keyframes share their error";
   EXPECT_NEAR(filter.age_s(20 + 1'000'000'000), 1.0, 1e-12);
 }
 

@@ -164,6 +164,24 @@ TEST(StaticResidual, BrightnessOfTheRightCameraIsRefinedFromItsResiduals) {
   EXPECT_EQ(k.right_brightness.bias, before.bias);
 }
 
+TEST(StaticResidual, ToLeaveTheViewIsNoGain) {
+  WorkerPool pool(1);
+  Window window = stereo_window();
+  PhotometricProblem problem(WindowConfig(), collect_points(&window), &window, &pool);
+  WindowLinearization now;
+  problem.linearize(problem.stored(), {}, &now);
+  const auto worst = std::max_element(
+      now.statics.begin(), now.statics.end(),
+      [](const StoredStatic& a, const StoredStatic& b) { return a.energy < b.energy; });
+  ASSERT_GT(worst->energy, 0.0F);
+  const auto i = static_cast<std::size_t>(worst - now.statics.begin());
+  problem.points()[i].point->rho = 20.0;  // 5 cm before a baseline of 12 cm
+  WindowLinearization next;
+  problem.linearize(now, {}, &next);
+  EXPECT_EQ(next.statics[i].state, ResidualState::kOutOfView);
+  EXPECT_EQ(next.statics[i].energy, worst->energy);
+}
+
 /// Eigenvalues, ascending, of the poses' part of the system after elimination of the depths.
 VecX pose_eigenvalues(Window* window) {
   WindowConfig config;

@@ -20,17 +20,6 @@ struct Range {
   double max = 0.0;
 };
 
-/// The left pixel looked for in the right image: X_right = R m + rho t.
-PatchSearch forward_search(const StereoRig& rig, const ImagePyramid& left,
-                           const ImagePyramid& right, const Vec2& pixel) {
-  const Mat3 r = rig.T_right_left.rotation_matrix();
-  const Vec3 m((pixel.x() - rig.left.cx) / rig.left.fx, (pixel.y() - rig.left.cy) / rig.left.fy,
-               1.0);
-  EpipolarCurve::Mat32 d_infinity;
-  d_infinity << r.col(0) / rig.left.fx, r.col(1) / rig.left.fy;
-  return {&left, &right, pixel, {rig.right, r * m, rig.T_right_left.translation(), d_infinity}};
-}
-
 /// The right pixel looked for in the left image, by inverse depth of the left frame's z.
 std::optional<PatchSearch> backward_search(const StereoRig& rig, const ImagePyramid& left,
                                            const ImagePyramid& right, const Vec2& pixel) {
@@ -225,7 +214,8 @@ std::pair<float, float> StaticMatcher::whole_range() const {
 StaticMatch StaticMatcher::match(const ImagePyramid& left, const ImagePyramid& right, float u,
                                  float v, const MatchRequest& request) const {
   StaticMatch out;
-  const PatchSearch search = forward_search(rig_, left, right, Vec2(u, v));
+  const Vec2 pixel(u, v);
+  const PatchSearch search{&left, &right, pixel, right_curve(rig_, pixel)};
   const auto [least, greatest] = request.inverse_depth_range.value_or(whole_range());
   Range range{static_cast<double>(least), static_cast<double>(greatest)};
   const bool clamp = range.min >= 0.0;

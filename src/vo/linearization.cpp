@@ -161,6 +161,10 @@ bool is_textured(const LinearizedResidual& residual) {
   return residual.gram[tri(0, 0)] + residual.gram[tri(1, 1)] >= kMinGradientEnergy;
 }
 
+BrightnessPart brightness_part(const LinearizedResidual& r) {
+  return {r.gram[tri(2, 2)], r.gram[tri(2, 3)], r.gram[tri(3, 3)], r.gram_r[2], r.gram_r[3]};
+}
+
 ShiftPart shift_part(const LinearizedResidual& r) {
   return {r.gram_r[0] * r.gram_r[0] + r.gram_r[1] * r.gram_r[1],
           r.gram[tri(0, 0)] + r.gram[tri(1, 1)]};

@@ -84,6 +84,14 @@ struct DepthPart {
 };
 DepthPart depth_part(const LinearizedResidual& residual);
 
+/// Part of a residual in the relative log-gain a and bias b of its keyframes: upper triangle of H,
+/// and gradient.
+struct BrightnessPart {
+  float aa = 0.0F, ab = 0.0F, bb = 0.0F;
+  float gradient_a = 0.0F, gradient_b = 0.0F;
+};
+BrightnessPart brightness_part(const LinearizedResidual& residual);
+
 /// Part of a residual in a shift of its pattern in the target image, whatever moves it: the squared
 /// length of its gradient, sum w (gx, gy) r, and the trace of its Hessian, sum w (gx, gy)^T (gx,
 /// gy).

@@ -14,15 +14,6 @@ namespace sovo {
 
 namespace {
 
-/// Where a pixel of the left image lies in the right one: X_right = R m + rho t.
-EpipolarCurve right_curve(const StereoRig& rig, double u, double v) {
-  const Mat3 r = rig.T_right_left.rotation_matrix();
-  const Vec3 m((u - rig.left.cx) / rig.left.fx, (v - rig.left.cy) / rig.left.fy, 1.0);
-  EpipolarCurve::Mat32 d_infinity;
-  d_infinity << r.col(0) / rig.left.fx, r.col(1) / rig.left.fy;
-  return {rig.right, r * m, rig.T_right_left.translation(), d_infinity};
-}
-
 /// The pattern around a point of the curve.
 void place_pattern(const CurvePoint& at, const ImageF& image, PatternProjection* out) {
   const auto element = [&](int i, int k) { return static_cast<float>(at.target_from_base(i, k)); };
@@ -79,8 +70,7 @@ void linearize_static(const StereoRig& rig, const WindowConfig& config, const Ke
                       const Point& point, LinearizedResidual* out) {
   out->state = ResidualState::kOutOfView;
   out->energy = 0.0F;
-  const EpipolarCurve curve =
-      right_curve(rig, static_cast<double>(point.u), static_cast<double>(point.v));
+  const EpipolarCurve curve = right_curve(rig, Vec2(point.u, point.v));
   const auto at = curve.at(point.rho);
   if (!at) return;
   const ImageF& image = host.right->level(0);
@@ -114,10 +104,11 @@ void refine_right_brightness(const StereoRig& rig, const WindowConfig& config, K
     if (judge(*keyframe, *keyframe, r.raw_energy, is_textured(r)).state != ResidualState::kIn) {
       continue;
     }
-    H(0, 0) += static_cast<double>(r.gram[7]);
-    H(0, 1) += static_cast<double>(r.gram[8]);
-    H(1, 1) += static_cast<double>(r.gram[9]);
-    b += Vec2(static_cast<double>(r.gram_r[2]), static_cast<double>(r.gram_r[3]));
+    const BrightnessPart part = brightness_part(r);
+    H(0, 0) += static_cast<double>(part.aa);
+    H(0, 1) += static_cast<double>(part.ab);
+    H(1, 1) += static_cast<double>(part.bb);
+    b += Vec2(part.gradient_a, part.gradient_b);
   }
   H(1, 0) = H(0, 1);
   const Vec2 step = -H.inverse() * b;
@@ -131,7 +122,7 @@ BrightnessTransfer fit_right_brightness(const StereoRig& rig, const Keyframe& ke
   std::vector<PatternMeans> means;
   const auto add = [&](float u, float v, const std::array<float, kPatternSize>& colour,
                        double rho) {
-    const auto at = right_curve(rig, static_cast<double>(u), static_cast<double>(v)).at(rho);
+    const auto at = right_curve(rig, Vec2(u, v)).at(rho);
     if (!at || !rig.right.contains(at->pixel, 6.0)) return;
     double left = 0.0;
     double right = 0.0;

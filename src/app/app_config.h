@@ -10,6 +10,7 @@
 #include "sovo/driver/live/live_options.h"
 #include "sovo/driver/sim/sim_config.h"
 #include "sovo/driver/v4l2/v4l2_options.h"
+#include "sovo/loop/loop_closer.h"
 #include "sovo/odometry/stereo_odometry.h"
 
 namespace sovo::app {
@@ -97,6 +98,7 @@ struct ReplaySection {
 /// Files that a run leaves; an empty name leaves none.
 struct OutputSection {
   std::string trajectory;
+  std::string map_trajectory;
   std::string live_trajectory;
   std::string keyframes;
   std::string profile;
@@ -105,6 +107,7 @@ struct OutputSection {
   template <class Visitor>
   void visit(Visitor& v) {
     v("trajectory", trajectory, "TUM file of the refined poses");
+    v("map_trajectory", map_trajectory, "TUM file of the refined poses with loops closed");
     v("live_trajectory", live_trajectory, "TUM file of the poses as published at the time");
     v("keyframes", keyframes, "CSV file of every scale optimization");
     v("profile", profile, "JSON file of the times by stage");
@@ -157,6 +160,7 @@ struct AppConfig {
   Preset preset = Preset::kDefault;
   Kernels kernels = Kernels::kAuto;
   StereoOdometryConfig odometry;  ///< Its keys stand at the top level of the file.
+  LoopConfig loops;
   CameraSection camera;
   sim::SimConfig sim;
   bridge::RecorderConfig record;
@@ -171,6 +175,7 @@ struct AppConfig {
     v("preset", preset, "values to begin with, before this file's");
     v("kernels", kernels, "inner loops; both give the bits of scalar code at the same speed");
     odometry.visit(v);
+    v("loops", loops, "loop closing");
     v("camera", camera, "source of frames");
     v("sim", sim, "simulated cameras");
     v("record", record, "recording of topics");

@@ -42,6 +42,38 @@ Result<void> check_weights(const DirectConfig& vo) {
   return {};
 }
 
+/// What loop closing could not work with.
+Result<void> check_loops(const AppConfig& config) {
+  const LoopConfig& l = config.loops;
+  if (!l.enabled && !config.output.map_trajectory.empty()) {
+    return Error{"output.map_trajectory (--out-map) needs loops.enabled (--loops)"};
+  }
+  if (l.enabled && config.odometry.mode == OdometryMode::kMono) {
+    return Error{"loops.enabled (--loops) needs metres: mode scale or stereo, not mono"};
+  }
+  if (!(l.place_step > 0.0 && l.place_turn_deg > 0.0)) {
+    return Error{"loops.place_step and place_turn_deg must be positive"};
+  }
+  if (l.min_gap < 1 || l.min_votes < 1 || l.max_candidates < 1) {
+    return Error{"loops.min_gap, min_votes and max_candidates must be at least 1"};
+  }
+  constexpr int kFewestPlaces = 100;
+  if (l.max_places < kFewestPlaces) return Error{"loops.max_places must be at least 100"};
+  constexpr int kFewestKeypoints = 50;
+  constexpr int kMostKeypoints = 5000;
+  if (l.keypoints.per_image < kFewestKeypoints || l.keypoints.per_image > kMostKeypoints) {
+    return Error{"loops.keypoints.per_image must be 50 to 5000"};
+  }
+  constexpr int kFewestInliers = 6;
+  if (l.matching.min_inliers < kFewestInliers || l.matching.max_hypotheses < 1) {
+    return Error{"loops.matching.min_inliers must be at least 6, max_hypotheses at least 1"};
+  }
+  if (!(l.matching.sigma_px > 0.0 && l.matching.max_ratio > 0.0)) {
+    return Error{"loops.matching.sigma_px and max_ratio must be positive"};
+  }
+  return {};
+}
+
 /// What the selection of pixels could not work with.
 Result<void> check_selection(const PixelSelectorConfig& s) {
   constexpr int kLeastRegion = 8;
@@ -148,6 +180,7 @@ Result<void> check_config(const AppConfig& config) {
   if (config.odometry.mapping_queue < 1) return Error{"mapping_queue must be at least 1"};
   if (auto weights = check_weights(config.odometry.vo); !weights) return weights;
   if (auto selection = check_selection(config.odometry.vo.selection); !selection) return selection;
+  if (auto loops = check_loops(config); !loops) return loops;
   if (!(config.node.idle_exit_s >= 0.0)) return Error{"node.idle_exit_s must not be negative"};
   if (config.node.left.empty() != config.node.right.empty()) {
     return Error{"node.left and node.right (--left, --right) are given together"};
@@ -193,6 +226,8 @@ void add_odometry_options(ConfigOptions& options) {
              "auto|scalar")
       .flag("--deterministic", "deterministic", "All stages in order: same input, same bytes")
       .value("--out", "output.trajectory", "Write the refined trajectory (TUM)", "FILE")
+      .flag("--loops", "loops.enabled", "Close loops: correct the trajectory in frame map")
+      .value("--out-map", "output.map_trajectory", "With --loops: write it corrected (TUM)", "FILE")
       .value("--out-live", "output.live_trajectory", "Write the poses as published (TUM)", "FILE")
       .value("--keyframes", "output.keyframes", "Write every scale optimization", "FILE.csv")
       .value("--profile", "output.profile", "Write the times by stage", "FILE.json");

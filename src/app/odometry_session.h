@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "sovo/app/app_config.h"
+#include "sovo/app/loop_sink.h"
 #include "sovo/app/profile_collector.h"
 #include "sovo/app/run_outputs.h"
 #include "sovo/app/run_recorder.h"
@@ -50,9 +51,11 @@ class TeeObserver : public StageObserver {
 /// An odometry with all that is recorded about it, from the first frame to the files at the end.
 class OdometrySession {
  public:
-  /// `sinks` and `observers` get outputs and times too; they must outlive the session.
+  /// `sinks` and `observers` get outputs and times too, and `on_place` the map of loop closing
+  /// (LoopSink), where that is enabled; they must outlive the session.
   OdometrySession(const AppConfig& config, const StereoCameras& cameras,
-                  std::vector<OutputSink*> sinks = {}, std::vector<StageObserver*> observers = {});
+                  std::vector<OutputSink*> sinks = {}, std::vector<StageObserver*> observers = {},
+                  LoopSink::OnPlace on_place = {});
 
   /// Live, frames that come faster than mapping goes are dropped and counted.
   void process(const StereoFrame& frame) { odometry_->process(frame); }
@@ -70,10 +73,13 @@ class OdometrySession {
   int finish(const StampMap& original_stamp = {});
 
  private:
+  void begin();
+
   AppConfig config_;
   StereoCameras cameras_;
   ProfileCollector profile_;
   RunRecorder recorder_;
+  std::unique_ptr<LoopSink> loops_;  ///< Null: loops are not closed.
   TeeSink sink_;
   TeeObserver observer_;
   std::unique_ptr<StereoOdometry> odometry_;

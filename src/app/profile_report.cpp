@@ -48,7 +48,8 @@ std::string profile_json(const ProfileCollector& profile, const RunCounts& count
   return json.dump(2) + "\n";
 }
 
-std::string run_summary(const ProfileCollector& profile, const RunCounts& counts) {
+std::string run_summary(const ProfileCollector& profile, const RunCounts& counts,
+                        const std::optional<LoopCounts>& loops) {
   const WorkCounters work = profile.counters();
   double frame_ms = 0.0;
   for (const StageSummary& s : profile.stages()) {
@@ -62,6 +63,10 @@ std::string run_summary(const ProfileCollector& profile, const RunCounts& counts
   text += fmt::format("keyframes        {} ({:.3f} a frame; {:.0f} points, {:.0f} residuals)\n",
                       counts.keyframes, keyframes_per_frame(counts), work.points, work.residuals);
   text += fmt::format("track lost       {} times\n", counts.lost_segments);
+  if (loops) {
+    text += fmt::format("loops closed     {} (places {}, views matched {}, impossible {})\n",
+                        loops->closures, loops->places, loops->matched, loops->refused);
+  }
   text += fmt::format("time a frame     {:.2f} ms\n", frame_ms);
   text += "scale verdicts   ";
   if (counts.verdicts.empty()) text += "none";

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "sovo/app/profile_collector.h"
 #include "sovo/app/run_recorder.h"
 #include "sovo/image/lanes.h"
+#include "sovo/loop/loop_closer.h"
 
 namespace sovo::app {
 
@@ -22,6 +24,7 @@ std::string profile_json(const ProfileCollector& profile, const RunCounts& count
                          const ProfileContext& context);
 
 /// What the run amounted to, as lines for the terminal.
-std::string run_summary(const ProfileCollector& profile, const RunCounts& counts);
+std::string run_summary(const ProfileCollector& profile, const RunCounts& counts,
+                        const std::optional<LoopCounts>& loops = std::nullopt);
 
 }  // namespace sovo::app

@@ -29,8 +29,9 @@ constexpr char kFrameType[] = "sovo_msgs/msg/StereoFrame";
 
 /// What an odometry process writes.
 constexpr std::array kOfVo = {
-    topics::kOdometry, topics::kScaledOdometry, topics::kStatus, topics::kKeyframe,
-    "tracked_points",  topics::kPath,           "points",        topics::kTf};
+    topics::kOdometry, topics::kScaledOdometry, topics::kStatus,  topics::kKeyframe,
+    "tracked_points",  topics::kPath,           topics::kMapPath, "points",
+    topics::kTf};
 /// What must not happen again only because it was recorded.
 constexpr std::array kOfUsers = {topics::kCommand, topics::kRecordCommand, topics::kRecordStatus};
 

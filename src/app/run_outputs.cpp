@@ -64,8 +64,9 @@ Result<void> check_writable(const std::string& file) {
 }  // namespace
 
 Result<void> check_outputs(const OutputSection& output) {
-  for (const std::string* file : {&output.trajectory, &output.live_trajectory, &output.keyframes,
-                                  &output.profile, &output.truth}) {
+  for (const std::string* file :
+       {&output.trajectory, &output.map_trajectory, &output.live_trajectory, &output.keyframes,
+        &output.profile, &output.truth}) {
     if (file->empty()) continue;
     if (auto writable = check_writable(*file); !writable) return writable;
   }
@@ -76,6 +77,10 @@ Result<void> write_outputs(const OutputSection& output, const RunResults& result
   const StampMap& map = results.original_stamp;
   if (!output.trajectory.empty()) {
     auto done = write_tum(output.trajectory, to_trajectory(from_first(results.refined), map));
+    if (!done) return done;
+  }
+  if (!output.map_trajectory.empty()) {
+    auto done = write_tum(output.map_trajectory, to_trajectory(from_first(results.corrected), map));
     if (!done) return done;
   }
   if (!output.live_trajectory.empty()) {

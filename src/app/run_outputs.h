@@ -1,18 +1,22 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "sovo/app/app_config.h"
 #include "sovo/app/frame_input.h"
 #include "sovo/app/profile_report.h"
 #include "sovo/io/result.h"
+#include "sovo/loop/loop_closer.h"
 
 namespace sovo::app {
 
 /// Everything that a run leaves.
 struct RunResults {
   std::vector<TrajectoryPose> refined;
+  std::vector<TrajectoryPose> corrected;  ///< The same in `map`; where loops are closed.
+  std::optional<LoopCounts> loops;        ///< Likewise.
   const RunRecorder* recorder = nullptr;
   const ProfileCollector* profile = nullptr;
   ProfileContext context;

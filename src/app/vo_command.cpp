@@ -10,6 +10,7 @@
 #include "sovo/app/odometry_session.h"
 #include "sovo/app/stop_signal.h"
 #include "sovo/bridge/command_subscriber.h"
+#include "sovo/bridge/map_publisher.h"
 #include "sovo/bridge/replay_clock.h"
 #include "sovo/bridge/ros_stereo_subscriber.h"
 #include "sovo/bridge/stereo_subscriber.h"
@@ -26,13 +27,17 @@ class VoProcess {
  public:
   VoProcess(const AppConfig& config, bridge::StereoFeed& source,
             bridge::CommandSubscriber& commands, bridge::ReplayClock& replay_clock,
-            bridge::VoPublisher& publisher)
+            bridge::VoPublisher& publisher, bridge::MapPublisher* map)
       : config_(config),
         source_(source),
         commands_(commands),
         replay_clock_(replay_clock),
         publisher_(publisher),
-        session_(config, source.cameras(), {&publisher}, {publisher.timings()}) {
+        map_(map),
+        session_(config, source.cameras(), {&publisher, map}, {publisher.timings()},
+                 [map](const LoopSink::Map& m) {
+                   if (map != nullptr) map->set_map(m.T_map_odom, m.places, m.closure.has_value());
+                 }) {
     publisher.set_cameras(session_.tracked_camera(), source.cameras().rig.left);
   }
 
@@ -82,11 +87,17 @@ class VoProcess {
     } else {
       session_.process(frame);
     }
-    if (publisher_.failed_writes() > reported_failures_) {
-      reported_failures_ = publisher_.failed_writes();
-      spdlog::warn("not published: {}", publisher_.last_failure());
-    }
+    report_failed_writes(publisher_, &reported_failures_);
+    if (map_ != nullptr) report_failed_writes(*map_, &reported_map_failures_);
     last_frame_ = Clock::now();  // the time that a frame took is no idleness
+  }
+
+  /// Tells of writes that have failed since the last time.
+  template <class Publisher>
+  static void report_failed_writes(const Publisher& publisher, std::uint64_t* reported) {
+    if (publisher.failed_writes() <= *reported) return;
+    *reported = publisher.failed_writes();
+    spdlog::warn("not published: {}", publisher.last_failure());
   }
 
   /// Another session is another run of the camera: nothing connects it with the map.
@@ -168,6 +179,7 @@ class VoProcess {
   bridge::CommandSubscriber& commands_;
   bridge::ReplayClock& replay_clock_;
   bridge::VoPublisher& publisher_;
+  bridge::MapPublisher* map_;  ///< Null: loops are not closed.
   OdometrySession session_;
   bool paused_ = false;
   int taken_ = 0;
@@ -175,6 +187,7 @@ class VoProcess {
   std::string camera_frame_;
   Clock::time_point last_frame_;
   std::uint64_t reported_failures_ = 0;
+  std::uint64_t reported_map_failures_ = 0;
 };
 
 Result<std::optional<StereoCameras>> read_calibration(const std::string& path) {
@@ -245,10 +258,17 @@ int serve(const AppConfig& config) {
   auto publisher =
       bridge::VoPublisher::open(*participant, publishing, (*source)->rig().T_base_left);
   if (!publisher) return fail(kFailed, publisher.error());
+  std::unique_ptr<bridge::MapPublisher> map;
+  if (config.loops.enabled) {
+    auto opened = bridge::MapPublisher::open(*participant, publishing.publish_tf,
+                                             (*source)->rig().T_base_left);
+    if (!opened) return fail(kFailed, opened.error());
+    map = std::move(*opened);
+  }
   spdlog::info("tracking frames of {}", config.node.left.empty()
                                             ? participant->topic("stereo")
                                             : config.node.left + " and " + config.node.right);
-  return VoProcess(config, **source, *commands, *replay_clock, **publisher).run(stop);
+  return VoProcess(config, **source, *commands, *replay_clock, **publisher, map.get()).run(stop);
 }
 
 }  // namespace

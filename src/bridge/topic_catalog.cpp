@@ -40,6 +40,7 @@ std::vector<CatalogTopic> make_catalog() {
       topic<msg::Keyframe>(kKeyframe, kKeyframeQos),
       on_demand<msg::TrackedPoints>("tracked_points", reliable(2)),
       topic<msg::Path>(kPath, kPathQos),
+      topic<msg::Path>(kMapPath, kMapPathQos),
       on_demand<msg::PointCloud2>("points", reliable(2)),
       topic<msg::VoCommand>(kCommand, kCommandQos),
       topic<msg::RecorderCommand>(kRecordCommand, kRecordCommandQos),

@@ -150,7 +150,7 @@ bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage&
   MappingOutcome start;
   start.map.active_points = vo_.window().num_active_points();
   start.map.keyframes = 1;
-  start.keyframes = {first_keyframe()};
+  start.keyframes = {first_keyframe(frame, right_pyramid)};
   start_outcome_ = std::move(start);
   return true;
 }
@@ -194,14 +194,14 @@ bool MapSegment::finish_two_views(const MonoFrame& frame, const SideImage* right
   }
   vo_.begin(*two_view_first_, T_odom_left_start_, points);
   TrackedFrame second = vo_.track_from(frame, result.T_newest_first);
+  const MonoFrame first_frame = *std::exchange(two_view_first_, std::nullopt);
   two_view_initializer_.reset();
-  two_view_first_.reset();
   if (!second.tracking.good) {
     reason_ = "beginning from two views: the second view could not be tracked";
     return false;
   }
   second.wants_keyframe = true;
-  KeyframeOutput first = first_keyframe();
+  KeyframeOutput first = first_keyframe(first_frame, nullptr);
   start_outcome_ = map(second, right);
   start_outcome_->keyframes.insert(start_outcome_->keyframes.begin(), std::move(first));
   initialized_ = !start_outcome_->map.failed;
@@ -280,7 +280,7 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
     observer_->on_window(static_cast<std::uint32_t>(out.map.bundle.points),
                          static_cast<std::uint32_t>(out.map.bundle.residuals));
   }
-  out.keyframes = {new_keyframe()};
+  out.keyframes = {new_keyframe(job.right)};
   revise_left(std::exchange(out.map.left, {}), &out.keyframes);
   if (use_right && config_.mode != OdometryMode::kMono && vo_.snapshot()) {
     job.snapshot = *vo_.snapshot();
@@ -379,14 +379,17 @@ ScaleStatus MapSegment::scale_status() const {
   return status_;
 }
 
-KeyframeOutput MapSegment::first_keyframe() const {
+KeyframeOutput MapSegment::first_keyframe(const MonoFrame& frame,
+                                          const ImagePyramidPtr& right) const {
   KeyframeOutput out = own_points(vo_.window_keyframes().front());
   out.scale_valid = metric();
   out.T_odom_left = vo_.window().newest().T_world_camera();
+  out.left = frame.pyramid;
+  out.right = right;
   return out;
 }
 
-KeyframeOutput MapSegment::new_keyframe() const {
+KeyframeOutput MapSegment::new_keyframe(const ImagePyramidPtr& right) const {
   const KeyframeSnapshot& s = *vo_.snapshot();
   KeyframeOutput out;
   out.id = s.id;
@@ -396,6 +399,11 @@ KeyframeOutput MapSegment::new_keyframe() const {
   out.T_odom_left = vo_.window().newest().T_world_camera();
   out.log_scale = vo_.log_scale();
   set_points(s.points, s.pyramid->level(0), &out);
+  out.covariance = vo_.reference()->covariance;
+  out.covariance.topLeftCorner<3, 3>() +=
+      scale_status().position_covariance(out.T_odom_left.translation());
+  out.left = s.pyramid;
+  out.right = right;
   return out;
 }
 

@@ -26,6 +26,12 @@ struct ScaleStatus {
   /// the place of the newest keyframe whose scale was sought.
   Mat3 path_covariance = Mat3::Zero();
   Vec3 path_until = Vec3::Zero();
+
+  /// What they add to that of a camera at `position` [m^2].
+  Mat3 position_covariance(const Vec3& position) const {
+    const Vec3 since = position - path_until;
+    return path_covariance + sigma * sigma * since * since.transpose();
+  }
 };
 
 /// A keyframe's snapshot with the right image that was taken with it.
@@ -96,8 +102,8 @@ class MapSegment {
   bool metric() const { return filter_.locked() && config_.mode != OdometryMode::kMono; }
   /// Whether static residuals own the scale, not similarities.
   bool stereo() const { return config_.mode == OdometryMode::kStereo; }
-  KeyframeOutput first_keyframe() const;
-  KeyframeOutput new_keyframe() const;
+  KeyframeOutput first_keyframe(const MonoFrame& frame, const ImagePyramidPtr& right) const;
+  KeyframeOutput new_keyframe(const ImagePyramidPtr& right) const;
   KeyframeOutput own_points(const KeyframeState& state) const;
   void revise(const SE3& T_odom_left, KeyframeOutput* keyframe) const;
   void revise_left(const std::vector<KeyframeState>& left, std::vector<KeyframeOutput>* out);

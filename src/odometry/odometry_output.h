@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sovo/geometry/se3.h"
+#include "sovo/image/pyramid.h"
 #include "sovo/scale/scale_optimizer.h"
 
 namespace sovo {
@@ -108,6 +109,11 @@ struct KeyframeOutput {
   std::vector<float> u, v;                  ///< Its points, in its undistorted image [px].
   std::vector<float> inverse_depth, sigma;  ///< 1 / z in its camera frame [1/m].
   std::vector<std::uint8_t> intensity;      ///< Grey levels of the image there.
+
+  // Of new keyframes only:
+  Mat6 covariance = Mat6::Zero();  ///< Of T_odom_left, as in OdometryOutput.
+  ImagePyramidPtr left;            ///< Its undistorted image.
+  ImagePyramidPtr right;           ///< The raw one that was taken with it; null: there was none.
 };
 
 /// One run of the scale optimizer, a line of `--keyframes`.

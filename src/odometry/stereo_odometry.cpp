@@ -80,7 +80,8 @@ class StereoOdometry::Impl {
     return recorder_.trajectory(&segment_->vo().keyframes());
   }
 
-  const CameraModel& tracked_camera() const { return preparation_.rig().left; }
+  const StereoRig& tracked_rig() const { return preparation_.rig(); }
+  const ImageU8& tracked_mask() const { return preparation_.left_mask(); }
 
  private:
   std::string refuse(const StereoFrame& frame) const {
@@ -245,9 +246,8 @@ class StereoOdometry::Impl {
     if (scale.accepted_stamp_ns != 0) {
       out->scale_age_s = kNanosecond * static_cast<double>(out->stamp_ns - scale.accepted_stamp_ns);
     }
-    const Vec3 since = T_odom_left.translation() - scale.path_until;
     out->pose_covariance.topLeftCorner<3, 3>() +=
-        scale.path_covariance + scale.sigma * scale.sigma * since * since.transpose();
+        scale.position_covariance(T_odom_left.translation());
     if (published_) set_velocity(scale.sigma, out);
     published_ = Published{out->stamp_ns, T_odom_left, frame};
     last_pose_ = T_odom_left;
@@ -341,6 +341,7 @@ void StereoOdometry::reset() { impl_->reset(); }
 std::vector<TrajectoryPose> StereoOdometry::refined_trajectory() const {
   return impl_->trajectory();
 }
-const CameraModel& StereoOdometry::tracked_camera() const { return impl_->tracked_camera(); }
+const StereoRig& StereoOdometry::tracked_rig() const { return impl_->tracked_rig(); }
+const ImageU8& StereoOdometry::tracked_mask() const { return impl_->tracked_mask(); }
 
 }  // namespace sovo

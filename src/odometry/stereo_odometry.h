@@ -132,8 +132,12 @@ class StereoOdometry {
   /// than a keyframe's own are undone. Ascending stamps.
   std::vector<TrajectoryPose> refined_trajectory() const;
 
-  /// The undistorted camera that is tracked.
-  const CameraModel& tracked_camera() const;
+  /// The undistorted camera that is tracked, and the raw right one.
+  const StereoRig& tracked_rig() const;
+  const CameraModel& tracked_camera() const { return tracked_rig().left; }
+
+  /// 0 where the tracked image must not be used; empty when all may be.
+  const ImageU8& tracked_mask() const;
 
  private:
   class Impl;

@@ -42,6 +42,17 @@ Result<void> check_weights(const DirectConfig& vo) {
   return {};
 }
 
+/// What would call stereo matching and send it away at once.
+Result<void> check_assist(const StereoAssistConfig& assist) {
+  if (!(assist.few_points >= 0.0 && assist.few_points <= assist.enough_points)) {
+    return Error{"assist.few_points must not be negative, nor above assist.enough_points"};
+  }
+  if (assist.good_keyframes < 1 || assist.disagreements < 1) {
+    return Error{"assist.good_keyframes and assist.disagreements must be at least 1"};
+  }
+  return {};
+}
+
 /// What loop closing could not work with.
 Result<void> check_loops(const AppConfig& config) {
   const LoopConfig& l = config.loops;
@@ -180,6 +191,7 @@ Result<void> check_config(const AppConfig& config) {
   if (config.odometry.mapping_queue < 1) return Error{"mapping_queue must be at least 1"};
   if (auto weights = check_weights(config.odometry.vo); !weights) return weights;
   if (auto selection = check_selection(config.odometry.vo.selection); !selection) return selection;
+  if (auto assist = check_assist(config.odometry.assist); !assist) return assist;
   if (auto loops = check_loops(config); !loops) return loops;
   if (!(config.node.idle_exit_s >= 0.0)) return Error{"node.idle_exit_s must not be negative"};
   if (config.node.left.empty() != config.node.right.empty()) {
@@ -219,7 +231,8 @@ void add_odometry_options(ConfigOptions& options) {
   options.value("--mode", "mode", "Who owns the metric scale", "mono|scale|stereo")
       .value("--preset", "preset", "Values to begin with", "embedded|default|quality")
       .value("--init", "init", "How the map begins", "auto|stereo|two_view")
-      .value("--depth-init", "depth_init", "A new point's first depth interval", "temporal|stereo")
+      .value("--depth-init", "depth_init", "A new point's first depth interval",
+             "temporal|stereo|auto")
       .value("--threads", "threads", "Of the loops inside the stages", "N")
       .value("--seed", "seed", "Of every random choice", "N")
       .value("--kernels", "kernels", "Inner loops; both give the same bits at the same speed",

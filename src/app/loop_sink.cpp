@@ -42,6 +42,7 @@ LoopSink::LoopSink(const LoopConfig& config, const StaticMatcherConfig& matcher,
 void LoopSink::begin(const StereoOdometry& odometry) {
   const std::scoped_lock lock(closer_mutex_, queue_mutex_);
   queue_.clear();
+  counts_ = {};
   closer_ = std::make_unique<LoopCloser>(config_, matcher_, odometry.tracked_rig(),
                                          odometry.tracked_mask());
 }
@@ -85,6 +86,7 @@ void LoopSink::take(const KeyframeOutput& keyframe) {
     if (!closer_) return;
     const std::uint64_t places = closer_->counts().places;
     map.closure = closer_->add(keyframe);
+    set_counts(closer_->counts());
     if (closer_->counts().places == places) return;
     map.T_map_odom = closer_->T_map_odom();
     if (on_place_) map.places = closer_->corrected_places();
@@ -97,6 +99,11 @@ void LoopSink::take(const KeyframeOutput& keyframe) {
                 c.inliers, c.moved_m);
   }
   if (on_place_) on_place_(map);
+}
+
+void LoopSink::set_counts(const LoopCounts& counts) {
+  const std::lock_guard lock(queue_mutex_);
+  counts_ = counts;
 }
 
 void LoopSink::finish() {
@@ -112,8 +119,8 @@ std::vector<TrajectoryPose> LoopSink::corrected(std::vector<TrajectoryPose> traj
 }
 
 LoopCounts LoopSink::counts() const {
-  const std::lock_guard lock(closer_mutex_);
-  return closer_ ? closer_->counts() : LoopCounts();
+  const std::lock_guard lock(queue_mutex_);
+  return counts_;
 }
 
 std::uint64_t LoopSink::dropped() const {

@@ -41,6 +41,7 @@ class LoopSink : public OutputSink {
   void finish();
 
   std::vector<TrajectoryPose> corrected(std::vector<TrajectoryPose> trajectory) const;
+  /// Does not wait for the work.
   LoopCounts counts() const;
   /// Keyframes that there was no time for.
   std::uint64_t dropped() const;
@@ -48,6 +49,7 @@ class LoopSink : public OutputSink {
  private:
   void work();
   void take(const KeyframeOutput& keyframe);
+  void set_counts(const LoopCounts& counts);
 
   LoopConfig config_;
   StaticMatcherConfig matcher_;
@@ -56,8 +58,9 @@ class LoopSink : public OutputSink {
   mutable std::mutex closer_mutex_;
   std::unique_ptr<LoopCloser> closer_;
 
-  mutable std::mutex queue_mutex_;
+  mutable std::mutex queue_mutex_;  // never held while work is done
   std::deque<KeyframeOutput> queue_;
+  LoopCounts counts_;  ///< As they were after the last keyframe.
   std::uint64_t dropped_ = 0;
 
   std::unique_ptr<bridge::BackgroundWorker> worker_;  // last: it uses what stands above

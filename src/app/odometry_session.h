@@ -67,6 +67,8 @@ class OdometrySession {
   /// The undistorted camera that keyframes' points belong to.
   const CameraModel& tracked_camera() const { return odometry_->tracked_camera(); }
   RunCounts counts() const { return recorder_.counts(); }
+  /// Null where loops are not closed.
+  const LoopSink* loops() const { return loops_.get(); }
 
   /// Finishes the work, writes the files and prints the summary to stdout. Returns an exit code:
   /// the job has failed when no frame was tracked, or a file could not be written.

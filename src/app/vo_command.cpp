@@ -122,6 +122,10 @@ class VoProcess {
     feed.last_command_result = commands_.last_result();
     feed.latency_origin_ns = source_.latency_origin_ns() + replay_clock_.lag_ns().value_or(0);
     feed.camera_frame = camera_frame_;
+    if (const LoopSink* loops = session_.loops()) {
+      const LoopCounts counts = loops->counts();
+      feed.loops = bridge::LoopStatus{counts.places, counts.closures, loops->dropped()};
+    }
     return feed;
   }
 

@@ -39,6 +39,11 @@ DiagnosticReport describe(const std::string& process_name, const OdometryOutput&
       {"scale_verdict", to_string(output.scale_verdict)},
       {"distance_m", std::to_string(output.distance_m)},
   };
+  if (feed.loops) {
+    report.values.emplace_back("loop_places", std::to_string(feed.loops->places));
+    report.values.emplace_back("loops_closed", std::to_string(feed.loops->closed));
+    report.values.emplace_back("loop_dropped", std::to_string(feed.loops->dropped));
+  }
   return report;
 }
 

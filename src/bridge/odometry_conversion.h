@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,12 @@ struct StageTime {
   float max_ms = 0.0F;
 };
 
+/// What loop closing has done.
+struct LoopStatus {
+  std::uint64_t places = 0, closed = 0;
+  std::uint64_t dropped = 0;  ///< Keyframes that it had no time for.
+};
+
 /// What VoStatus says beside the odometry's own state: known to the process around it.
 struct FeedStatus {
   std::uint64_t lost_transport = 0;  ///< Missing in the received sequence.
@@ -45,6 +52,7 @@ struct FeedStatus {
   std::string camera_frame;  ///< Left optical frame, as the frames name it.
   /// Time that latency is counted from [ns, UTC]; 0: the frame's stamp.
   std::int64_t latency_origin_ns = 0;
+  std::optional<LoopStatus> loops;  ///< Where loops are closed; on /diagnostics.
 };
 
 // All messages below borrow from their arguments (borrow.h).

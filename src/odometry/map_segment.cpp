@@ -94,6 +94,7 @@ MapSegment::MapSegment(const StereoOdometryConfig& config, const FramePreparatio
       matcher_(config.matcher, preparation.rig()),
       optimizer_(config.scale, preparation.rig()),
       filter_(config.filter),
+      assist_(config.assist),
       scale_path_until_(T_odom_left_start.translation()) {}
 
 bool MapSegment::initialize(const MonoFrame& frame, const SideImage* right) {
@@ -250,6 +251,13 @@ DepthProposer MapSegment::stereo_proposer(const ImagePyramidPtr& left,
   };
 }
 
+bool MapSegment::matches_new_pixels() const {
+  if (config_.mode == OdometryMode::kMono || config_.depth_init == DepthInit::kTemporal)
+    return false;
+  // Static residuals need them: their images' brightness is fitted there.
+  return config_.depth_init == DepthInit::kStereo || stereo() || assist_.wanted();
+}
+
 MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* right) {
   MappingOutcome out;
   const MapTimer timer = [this](MapStage stage, double seconds) {
@@ -267,7 +275,7 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
     job.pyramid_seconds = seconds_since(start);
     // Depths of an unscaled map are no metres.
     const bool metric = filter_.locked();
-    if (config_.mode != OdometryMode::kMono && config_.depth_init == DepthInit::kStereo && metric) {
+    if (metric && matches_new_pixels()) {
       keyframe_stereo.depths = stereo_proposer(tracked.frame.pyramid, *job.right);
     }
     if (stereo() && metric) keyframe_stereo.right = job.right;
@@ -275,6 +283,8 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
   out.map = vo_.map(tracked, keyframe_stereo, timer);
   broken_ = out.map.failed;
   if (!out.map.is_keyframe || out.map.failed) return out;
+  assist_.on_keyframe(static_cast<double>(out.map.active_points) / config_.vo.points.active_points,
+                      tracked.tracking.inlier_ratio);
   window_scale_variance_ = out.map.bundle.scale_variance + std::pow(config_.scale.sigma_floor, 2);
   if (observer_ != nullptr) {
     observer_->on_window(static_cast<std::uint32_t>(out.map.bundle.points),
@@ -317,6 +327,7 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
   const double sigma_before = filter_.path_sigma();
   const ScaleUpdate update =
       stereo() ? filter_.watch(m, window_scale_variance_) : filter_.update(m);
+  assist_.on_scale(update.verdict != ScaleVerdict::kInnovation);
   ScaleRecord record;
   record.stamp_ns = job.snapshot.stamp_ns;
   record.keyframe_id = job.snapshot.id;

@@ -100,6 +100,8 @@ class MapSegment {
                                      const std::vector<SelectedPixel>& pixels) const;
   DepthProposer stereo_proposer(const ImagePyramidPtr& left, const ImagePyramid& right) const;
   bool metric() const { return filter_.locked() && config_.mode != OdometryMode::kMono; }
+  /// Whether new pixels get their depths from the right image.
+  bool matches_new_pixels() const;
   /// Whether static residuals own the scale, not similarities.
   bool stereo() const { return config_.mode == OdometryMode::kStereo; }
   KeyframeOutput first_keyframe(const MonoFrame& frame, const ImagePyramidPtr& right) const;
@@ -121,6 +123,7 @@ class MapSegment {
   StaticMatcher matcher_;
   ScaleOptimizer optimizer_;
   ScaleFilter filter_;
+  StereoAssist assist_;
 
   double window_scale_variance_ = 0.0;  ///< Mode stereo: after the last bundle adjustment.
   bool initialized_ = false;

@@ -9,6 +9,7 @@
 #include "sovo/image/stereo_frame.h"
 #include "sovo/image/undistorter.h"
 #include "sovo/odometry/odometry_output.h"
+#include "sovo/odometry/stereo_assist.h"
 #include "sovo/scale/scale_filter.h"
 #include "sovo/scale/scale_optimizer.h"
 #include "sovo/vo/direct_config.h"
@@ -33,6 +34,7 @@ enum class InitMethod {
 enum class DepthInit {
   kTemporal,  ///< From epipolar search in following left images (the paper).
   kStereo,    ///< From a static match; never a prior or a residual.
+  kAuto,      ///< Temporal, and stereo while that fails (StereoAssist).
 };
 
 /// Names of enum values in configuration files, found by argument-dependent lookup.
@@ -46,8 +48,10 @@ constexpr std::array<std::pair<InitMethod, const char*>, 3> enum_names(InitMetho
            {InitMethod::kStereo, "stereo"},
            {InitMethod::kTwoView, "two_view"}}};
 }
-constexpr std::array<std::pair<DepthInit, const char*>, 2> enum_names(DepthInit) {
-  return {{{DepthInit::kTemporal, "temporal"}, {DepthInit::kStereo, "stereo"}}};
+constexpr std::array<std::pair<DepthInit, const char*>, 3> enum_names(DepthInit) {
+  return {{{DepthInit::kTemporal, "temporal"},
+           {DepthInit::kStereo, "stereo"},
+           {DepthInit::kAuto, "auto"}}};
 }
 
 struct StereoOdometryConfig {
@@ -55,6 +59,7 @@ struct StereoOdometryConfig {
   InitMethod init = InitMethod::kAuto;
   double init_min_matched = 0.3;  ///< Share of good static matches that `auto` asks for.
   DepthInit depth_init = DepthInit::kStereo;
+  StereoAssistConfig assist;
   int downscale = 1;           ///< Whole number by which input images are reduced.
   bool deterministic = false;  ///< All stages in order on the caller's thread.
   int threads = 2;             ///< Of the loops inside the stages; changes no bit of the result.
@@ -77,6 +82,7 @@ struct StereoOdometryConfig {
     v("init_min_matched", init_min_matched,
       "share of good static matches that init: auto asks for");
     v("depth_init", depth_init, "where a new point's first depth interval comes from");
+    v("assist", assist, "depth_init: auto, when stereo matching helps");
     v("downscale", downscale, "whole number by which input images are reduced");
     v("deterministic", deterministic, "all stages in order on one thread");
     v("threads", threads, "of the loops inside the stages; changes no bit of the result");

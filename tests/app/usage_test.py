@@ -40,7 +40,10 @@ class Configuration(CommandTest):
         for assignment in ["mode=fast", "threads=many", "threads=0", "camera.rate=-1",
                            "camera.start=-1", "no.such.key=1", "mode",
                            "vo.keyframe.approach=-1", "vo.window.static_weight=nan",
-                           "vo.selection.border=3", "vo.selection.least_offset=8"]:
+                           "vo.selection.border=3", "vo.selection.least_offset=8",
+                           "assist.few_points=0.9", "assist.good_keyframes=0",
+                           "loops.place_step=0", "loops.keypoints.per_image=10",
+                           "loops.max_places=1", "loops.matching.sigma_px=0"]:
             with self.subTest(assignment=assignment):
                 self.expect(sovo("--set", assignment, "config"), USAGE)
 

@@ -166,5 +166,21 @@ TEST(Diagnostics, LostIsAnErrorAndTrackingIsOk) {
             std::string::npos);
 }
 
+TEST(Diagnostics, SpeakOfLoopsWhereTheyAreClosed) {
+  const auto value_of = [](const DiagnosticReport& report, const std::string& key) {
+    for (const auto& [name, value] : report.values) {
+      if (name == key) return value;
+    }
+    return std::string("none");
+  };
+  FeedStatus feed;
+  EXPECT_EQ(value_of(describe("", test_output(), feed), "loops_closed"), "none");
+  feed.loops = LoopStatus{40, 3, 1};
+  const DiagnosticReport report = describe("", test_output(), feed);
+  EXPECT_EQ(value_of(report, "loop_places"), "40");
+  EXPECT_EQ(value_of(report, "loops_closed"), "3");
+  EXPECT_EQ(value_of(report, "loop_dropped"), "1");
+}
+
 }  // namespace
 }  // namespace sovo::bridge

@@ -1,0 +1,52 @@
+#pragma once
+
+namespace sovo {
+
+struct StereoAssistConfig {
+  double few_points = 0.25;    ///< Active points, of those wanted, below which it is called.
+  double enough_points = 0.4;  ///< And above which it may go.
+  double min_inliers = 0.65;   ///< Share of pixels that agree, below which it is called.
+  int disagreements = 2;       ///< Scales in a row that disagree, which call it.
+  int good_keyframes = 3;      ///< In a row, after which it goes.
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("few_points", few_points, "active points, of those wanted, below which it is called");
+    v("enough_points", enough_points, "and above which it may go");
+    v("min_inliers", min_inliers, "share of pixels that agree, below which it is called");
+    v("disagreements", disagreements, "scales in a row that disagree, which call it");
+    v("good_keyframes", good_keyframes, "good keyframes in a row after which it goes");
+  }
+};
+
+/// Tells when the monocular odometry fails and stereo matching must help it (the future work of the
+/// paper): while too few points find their depth in later images, tracking fits badly or the scale
+/// jumps, new pixels get their depths from the right image at once.
+class StereoAssist {
+ public:
+  explicit StereoAssist(const StereoAssistConfig& config) : config_(config) {}
+
+  /// Whether the next keyframe's pixels are to be matched.
+  bool wanted() const { return wanted_; }
+
+  /// A keyframe was mapped: active points, of those wanted, and the share of pixels that agreed.
+  void on_keyframe(double points, double inliers) {
+    const bool fails = points < config_.few_points || inliers < config_.min_inliers ||
+                       disagreed_ >= config_.disagreements;
+    const bool good = !fails && points > config_.enough_points;
+    good_ = good ? good_ + 1 : 0;
+    if (fails) wanted_ = true;
+    if (good_ >= config_.good_keyframes) wanted_ = false;
+  }
+
+  /// A scale was sought and found, and agrees with the one known or does not.
+  void on_scale(bool agrees) { disagreed_ = agrees ? 0 : disagreed_ + 1; }
+
+ private:
+  StereoAssistConfig config_;
+  bool wanted_ = false;
+  int good_ = 0;
+  int disagreed_ = 0;
+};
+
+}  // namespace sovo

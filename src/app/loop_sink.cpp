@@ -40,11 +40,16 @@ LoopSink::LoopSink(const LoopConfig& config, const StaticMatcherConfig& matcher,
 }
 
 void LoopSink::begin(const StereoOdometry& odometry) {
-  const std::scoped_lock lock(closer_mutex_, queue_mutex_);
-  queue_.clear();
-  counts_ = {};
-  closer_ = std::make_unique<LoopCloser>(config_, matcher_, odometry.tracked_rig(),
-                                         odometry.tracked_mask());
+  bool anew = false;
+  {
+    const std::scoped_lock lock(closer_mutex_, queue_mutex_);
+    queue_.clear();
+    counts_ = {};
+    anew = closer_ != nullptr;
+    closer_ = std::make_unique<LoopCloser>(config_, matcher_, odometry.tracked_rig(),
+                                           odometry.tracked_mask());
+  }
+  if (anew && on_place_) on_place_({});
 }
 
 void LoopSink::on_keyframe(const KeyframeOutput& keyframe) {

@@ -30,7 +30,8 @@ class LoopSink : public OutputSink {
   LoopSink(const LoopConfig& config, const StaticMatcherConfig& matcher, bool background,
            OnPlace on_place);
 
-  /// Begins with nothing. Before the odometry gets its first frame, and when it begins anew.
+  /// Begins with nothing. Before the odometry gets its first frame, and when it begins anew; then
+  /// `on_place` is told of a map without places.
   void begin(const StereoOdometry& odometry);
 
   void on_frame(const OdometryOutput& /*output*/) override {}

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <random>
 
 namespace sovo {
@@ -13,8 +12,9 @@ constexpr std::array<double, kLevels> kLevelShare{0.5, 0.3, 0.2};
 constexpr int kDiscRadius = 15;     ///< Of the pixels that tell a keypoint's direction [px].
 constexpr int kCompareRadius = 13;  ///< Of those that a descriptor compares.
 constexpr int kBorder = kDiscRadius + 2;
-constexpr int kTensorRadius = 2;
-constexpr int kPerCell = 2;
+constexpr int kTensorRadius = 2;  ///< Of the square whose gradients make a corner.
+constexpr int kTensorSide = 2 * kTensorRadius + 1;
+constexpr int kPerCell = 2;  ///< Corners in a cell of the grid that spreads them.
 
 struct Offset {
   float x, y;
@@ -51,51 +51,69 @@ struct Corner {
   int x = 0, y = 0;
 };
 
-/// Lesser eigenvalue of the gradients' second moments around every pixel, their mean over
-/// (2 kTensorRadius + 1)^2 pixels.
+/// Products of an image's gradients, one image each.
+struct GradientProducts {
+  ImageF xx, xy, yy;
+};
+
+GradientProducts gradient_products(const ImageF& image) {
+  const int w = image.width();
+  const int h = image.height();
+  GradientProducts out{ImageF(w, h), ImageF(w, h), ImageF(w, h)};
+  for (int y = 1; y + 1 < h; ++y) {
+    const float* above = image.row(y - 1);
+    const float* row = image.row(y);
+    const float* below = image.row(y + 1);
+    for (int x = 1; x + 1 < w; ++x) {
+      const float gx = 0.5F * (row[x + 1] - row[x - 1]);
+      const float gy = 0.5F * (below[x] - above[x]);
+      out.xx.at(x, y) = gx * gx;
+      out.xy.at(x, y) = gx * gy;
+      out.yy.at(x, y) = gy * gy;
+    }
+  }
+  return out;
+}
+
+/// Sums over columns of kTensorSide pixels around row `y`.
+void sum_columns(const ImageF& image, int y, std::vector<float>* sums) {
+  sums->assign(static_cast<std::size_t>(image.width()), 0.0F);
+  for (int k = -kTensorRadius; k <= kTensorRadius; ++k) {
+    const float* row = image.row(y + k);
+    for (std::size_t x = 0; x < sums->size(); ++x) (*sums)[x] += row[x];
+  }
+}
+
+float sum_around(const std::vector<float>& columns, int x) {
+  float sum = 0.0F;
+  for (int k = -kTensorRadius; k <= kTensorRadius; ++k) {
+    sum += columns[static_cast<std::size_t>(x + k)];
+  }
+  return sum;
+}
+
+/// Lesser eigenvalue of the gradients' second moments around every pixel, their mean over a square
+/// of kTensorSide pixels.
 ImageF corner_response(const ImageF& image) {
   const int w = image.width();
   const int h = image.height();
   constexpr int kReach = kTensorRadius + 1;
-  constexpr int kSide = 2 * kTensorRadius + 1;
+  const GradientProducts products = gradient_products(image);
   ImageF response(w, h);
-  // Sums over the columns of a band of rows, kept by adding one row and taking one away.
-  ImageF xx(w, h), xy(w, h), yy(w, h);
-  for (int y = 1; y + 1 < h; ++y) {
-    for (int x = 1; x + 1 < w; ++x) {
-      const float gx = 0.5F * (image.at(x + 1, y) - image.at(x - 1, y));
-      const float gy = 0.5F * (image.at(x, y + 1) - image.at(x, y - 1));
-      xx.at(x, y) = gx * gx;
-      xy.at(x, y) = gx * gy;
-      yy.at(x, y) = gy * gy;
-    }
-  }
-  const auto rows = [&](const ImageF& m, int x, int y) {
-    float sum = 0.0F;
-    for (int k = -kTensorRadius; k <= kTensorRadius; ++k) sum += m.at(x, y + k);
-    return sum;
-  };
-  std::vector<float> a(static_cast<std::size_t>(w)), b(a), c(a);
+  std::vector<float> xx;
+  std::vector<float> xy;
+  std::vector<float> yy;
   for (int y = kReach; y + kReach < h; ++y) {
-    for (int x = 1; x + 1 < w; ++x) {
-      const auto i = static_cast<std::size_t>(x);
-      a[i] = rows(xx, x, y);
-      b[i] = rows(xy, x, y);
-      c[i] = rows(yy, x, y);
-    }
+    sum_columns(products.xx, y, &xx);
+    sum_columns(products.xy, y, &xy);
+    sum_columns(products.yy, y, &yy);
     for (int x = kReach; x + kReach < w; ++x) {
-      float sa = 0.0F;
-      float sb = 0.0F;
-      float sc = 0.0F;
-      for (int k = -kTensorRadius; k <= kTensorRadius; ++k) {
-        const auto i = static_cast<std::size_t>(x + k);
-        sa += a[i];
-        sb += b[i];
-        sc += c[i];
-      }
-      const float half_difference = 0.5F * (sa - sc);
-      const float root = std::sqrt(half_difference * half_difference + sb * sb);
-      response.at(x, y) = (0.5F * (sa + sc) - root) / (kSide * kSide);
+      const float a = sum_around(xx, x);
+      const float b = sum_around(xy, x);
+      const float c = sum_around(yy, x);
+      const float half = 0.5F * (a - c);
+      response.at(x, y) =
+          (0.5F * (a + c) - std::sqrt(half * half + b * b)) / (kTensorSide * kTensorSide);
     }
   }
   return response;

@@ -64,6 +64,7 @@ TEST_F(LoopSinkTest, AtOnceEveryKeyframeIsTakenBeforeItReturns) {
   }
   sink.begin(odometry_);
   EXPECT_EQ(sink.counts().places, 0U);
+  EXPECT_EQ(told, 0U) << "the old map is taken back";
 }
 
 TEST_F(LoopSinkTest, LiveTheOldestOfTooManyAreDroppedAndNoRevisionIs) {

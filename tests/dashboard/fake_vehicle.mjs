@@ -46,6 +46,7 @@ const kTypes = {
   "right/preview_small/compressed": "sensor_msgs/msg/CompressedImage",
   tracked_points: "sovo_msgs/msg/TrackedPoints",
   odom: "nav_msgs/msg/Odometry",
+  map_path: "nav_msgs/msg/Path",
 };
 const kMime = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
 
@@ -71,7 +72,7 @@ export async function startFakeVehicle(page, vehicles = ["/sovo"], port = 0) {
       schemaEncoding: "ros2msg",
     })),
   );
-  const shown = channels.filter((c) => /^\/[^/]+\/(?!odom$)/.test(c.topic));
+  const shown = channels.filter((c) => /^\/[^/]+\/(?!odom$|map_path$)/.test(c.topic));
   const clients = new Map();
   sockets.on("connection", (socket) => {
     const subscriptions = new Map();

@@ -82,6 +82,11 @@ async function checkSecondTrajectory(sent) {
   await page.selectOption("select[aria-label='second trajectory']", "/tug/odom");
   await told(/tug\/odom: drawn as it is/);
   await until(() => bus.isHeard("/tug/odom"), "a subscription to the other vehicle");
+  const offered = await page.locator("select[aria-label='second trajectory'] option").allTextContents();
+  assert.ok(!offered.some((name) => name.includes("/sovo/odom")), "the own one is drawn already");
+  await page.selectOption("select[aria-label='second trajectory']", "/sovo/map_path");
+  await told(/sovo\/map_path: drawn as it is/);
+  await until(() => bus.isHeard("/sovo/map_path"), "a subscription to the own places");
   await page.click("button:has-text('None')");
   await told(/Ground truth, a replay/);
   await until(() => !bus.isHeard("/tug/odom"), "the end of that subscription");

@@ -333,11 +333,13 @@ export function vehiclesOf(link: Connection): string[] {
   return [...names].sort();
 }
 
-/** Topics that a second trajectory can be drawn from. */
+/** Topics that a second trajectory can be drawn from: of other vehicles, and the own places with
+    loops closed. */
 export function trajectoryTopics(link: Connection, own: string): string[] {
   const types = ["nav_msgs/msg/Odometry", "nav_msgs/msg/Path"];
   return [...link.channels.values()]
-    .filter((c) => types.includes(c.schemaName) && !c.topic.startsWith(`${own}/`))
+    .filter((c) => types.includes(c.schemaName))
+    .filter((c) => !c.topic.startsWith(`${own}/`) || c.topic === `${own}/map_path`)
     .map((c) => c.topic)
     .sort();
 }

@@ -25,7 +25,7 @@ struct LoopConfig {
   int min_votes = 12;          ///< Keypoints that name a place before it is looked at closely.
   double lost_support = 0.25;  ///< Share of landmarks seen again where no covariance is a guard.
   int max_candidates = 3;      ///< Places that are looked at closely, for each new one.
-  int max_places = 10'000;     ///< The oldest ones are forgotten.
+  int max_places = 3000;       ///< The oldest ones are forgotten.
   KeypointConfig keypoints;
   PlaceMatcherConfig matching;
 

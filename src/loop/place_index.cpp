@@ -9,8 +9,12 @@ namespace {
 
 /// Descriptors that differ in more bits are of different things.
 constexpr int kMostDifferent = 60;
-/// The same of their first 64 bits: two standard deviations more than a quarter.
-constexpr int kMostDifferentOf64 = 22;
+/// The same of their first 32 bits: two standard deviations more than an eighth.
+constexpr int kMostDifferentOf32 = 12;
+
+std::uint32_t first_bits_of(const BinaryDescriptor& descriptor) {
+  return static_cast<std::uint32_t>(descriptor.bits[0]);
+}
 /// A bucket with more entries tells too little to be worth its time.
 constexpr std::size_t kLongestBucket = 1000;
 
@@ -39,12 +43,13 @@ PlaceIndex::Key PlaceIndex::key(int table, const BinaryDescriptor& descriptor) c
 
 void PlaceIndex::add(std::uint32_t place, const std::vector<Landmark>& landmarks) {
   std::vector<BinaryDescriptor>& descriptors = descriptors_[place];
-  for (std::uint32_t i = 0; i < landmarks.size(); ++i) {
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
     const BinaryDescriptor& descriptor = landmarks[i].keypoint.descriptor;
     descriptors.push_back(descriptor);
     for (int t = 0; t < kTables; ++t) {
       auto& bucket = buckets_[key(t, descriptor)];
-      if (bucket.size() < kLongestBucket) bucket.push_back({place, i, descriptor.bits[0]});
+      if (bucket.size() >= kLongestBucket) continue;
+      bucket.push_back({place, first_bits_of(descriptor), static_cast<std::uint16_t>(i)});
     }
   }
 }
@@ -75,8 +80,8 @@ std::vector<PlaceIndex::Votes> PlaceIndex::find(const std::vector<Landmark>& lan
     for (int t = 0; t < kTables; ++t) {
       for (const BucketEntry& candidate : buckets_[key(t, descriptor)]) {
         if (candidate.place >= end) break;  // they ascend
-        const std::uint64_t different = candidate.first_bits ^ descriptor.bits[0];
-        if (sum_of_bytes(ones_by_byte(different)) > kMostDifferentOf64) continue;
+        const std::uint32_t different = candidate.first_bits ^ first_bits_of(descriptor);
+        if (sum_of_bytes(ones_by_byte(different)) > kMostDifferentOf32) continue;
         const std::size_t p = candidate.place - first_;
         if (last_voter[p] == i) continue;
         if (hamming(known[p][candidate.landmark], descriptor) > kMostDifferent) continue;

@@ -32,13 +32,13 @@ class PlaceIndex {
                           int most, int apart) const;
 
  private:
-  static constexpr int kTables = 12;
+  static constexpr int kTables = 8;
   static constexpr int kKeyBits = 16;
-  /// Most of a bucket's entries are told apart by a quarter of the descriptor, which lies in it.
+  /// Most of a bucket's entries are told apart by an eighth of the descriptor, which lies in it.
   struct BucketEntry {
     std::uint32_t place;
-    std::uint32_t landmark;  ///< Of the place.
-    std::uint64_t first_bits;
+    std::uint32_t first_bits;
+    std::uint16_t landmark;  ///< Of the place.
   };
   using Key = std::uint32_t;
 

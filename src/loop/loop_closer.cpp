@@ -213,6 +213,8 @@ bool LoopCloser::agree(const Loop& a, const Loop& b) const {
 
 std::optional<LoopClosure> LoopCloser::close(std::uint32_t newer) {
   constexpr std::uint32_t kNear = 10;  // places from one loop to one that confirms it
+  std::erase_if(loops_,
+                [&](const Loop& loop) { return !loop.closed && newer - loop.newer > kNear; });
   const SE3 before = node(newer).T_map_left;
   const Loop* closing = nullptr;
   for (Loop& loop : loops_) {
@@ -229,8 +231,6 @@ std::optional<LoopClosure> LoopCloser::close(std::uint32_t newer) {
       if (closing == nullptr || loop.match.inliers > closing->match.inliers) closing = &loop;
     }
   }
-  std::erase_if(loops_,
-                [&](const Loop& loop) { return !loop.closed && newer - loop.newer > kNear; });
   if (closing == nullptr) return std::nullopt;
   LoopClosure closure;
   closure.older_stamp_ns = node(closing->older).place.stamp_ns;

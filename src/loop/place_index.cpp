@@ -15,6 +15,7 @@ constexpr int kMostDifferentOf32 = 12;
 std::uint32_t first_bits_of(const BinaryDescriptor& descriptor) {
   return static_cast<std::uint32_t>(descriptor.bits[0]);
 }
+
 /// A bucket with more entries tells too little to be worth its time.
 constexpr std::size_t kLongestBucket = 1000;
 

@@ -137,7 +137,15 @@ TEST(LoopCloser, TheSecondLapTakesTheDriftAway) {
     DriftingOdometry odometry(seed);
     LoopCloser closer = make_closer();
     std::uint64_t closures = 0;
-    for (int i = 0; i < 2 * kLap; ++i) closures += closer.add(odometry.next(i)) ? 1 : 0;
+    for (int i = 0; i < 2 * kLap; ++i) {
+      const KeyframeOutput keyframe = odometry.next(i);
+      const auto closure = closer.add(keyframe);
+      if (!closure) continue;
+      ++closures;
+      EXPECT_EQ(closure->newer_stamp_ns, keyframe.stamp_ns);
+      EXPECT_LT(closure->older_stamp_ns, keyframe.stamp_ns);
+      EXPECT_GE(closure->inliers, small_config().matching.min_inliers);
+    }
     closer.finish();
     EXPECT_GT(closures, 5U);
     EXPECT_EQ(closer.counts().places, 2U * kLap);

@@ -85,6 +85,20 @@ Result<void> check_loops(const AppConfig& config) {
   return {};
 }
 
+/// With what images could not be freed of their light.
+Result<void> check_local_contrast(const LocalContrastConfig& c) {
+  constexpr double kWidest = 0.5;
+  if (!(c.radius > 0.0 && c.radius <= kWidest)) {
+    return Error{"local_contrast.radius must be above 0 and at most 0.5"};
+  }
+  constexpr double kLeastFloor = 0.1;
+  constexpr double kHighestFloor = 255.0;
+  if (!(c.floor >= kLeastFloor && c.floor <= kHighestFloor)) {
+    return Error{"local_contrast.floor must be 0.1 to 255"};
+  }
+  return {};
+}
+
 /// What the selection of pixels could not work with.
 Result<void> check_selection(const PixelSelectorConfig& s) {
   constexpr int kLeastRegion = 8;
@@ -192,6 +206,7 @@ Result<void> check_config(const AppConfig& config) {
   if (auto weights = check_weights(config.odometry.vo); !weights) return weights;
   if (auto selection = check_selection(config.odometry.vo.selection); !selection) return selection;
   if (auto assist = check_assist(config.odometry.assist); !assist) return assist;
+  if (auto light = check_local_contrast(config.odometry.local_contrast); !light) return light;
   if (auto loops = check_loops(config); !loops) return loops;
   if (!(config.node.idle_exit_s >= 0.0)) return Error{"node.idle_exit_s must not be negative"};
   if (config.node.left.empty() != config.node.right.empty()) {

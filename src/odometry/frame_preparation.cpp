@@ -61,7 +61,9 @@ FramePreparation::FramePreparation(const StereoOdometryConfig& config, const Ste
     : cameras_(cameras),
       downscale_(std::max(1, config.downscale)),
       max_levels_(config.vo.tracker.max_levels),
-      rig_(cameras.rig) {
+      rig_(cameras.rig),
+      local_contrast_(config.local_contrast) {
+  if (config.lighting == Lighting::kVehicle) left_contrast_.emplace(local_contrast_);
   const CameraModel raw_left = cameras.rig.left.downscaled(downscale_);
   rig_.left = optimal_pinhole(raw_left, config.undistortion);
   rig_.right = cameras.rig.right.downscaled(downscale_);
@@ -101,7 +103,8 @@ bool FramePreparation::takes_bytes(const SideImage& left) const {
 MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver* observer) {
   MonoFrame out;
   out.stamp_ns = frame.stamp_ns;
-  out.exposure_s = frame.left.exposure_s;
+  // Without its light an image does not depend on its exposure.
+  if (!left_contrast_) out.exposure_s = frame.left.exposure_s;
   auto pyramid = left_pyramids_.take();
   std::optional<ScopedStage> stage(std::in_place, observer, Stage::kUndistortion);
   pyramid->rebuild(max_levels_, [&](ImageF* image) {
@@ -113,6 +116,7 @@ MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver
     } else {
       to_float(frame.left, cameras_.left_photometric, downscale_, image);
     }
+    if (left_contrast_) left_contrast_->apply(image);
     stage.emplace(observer, Stage::kPyramid);
   });
   out.pyramid = std::move(pyramid);
@@ -122,6 +126,7 @@ MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver
 ImagePyramid FramePreparation::prepare_right(const SideImage& right) const {
   ImageF image;
   to_float(right, cameras_.right_photometric, downscale_, &image);
+  if (left_contrast_) LocalContrast(local_contrast_).apply(&image);
   const int levels = ImagePyramid::num_levels_for(image.width(), image.height(), max_levels_);
   return {std::move(image), levels};
 }

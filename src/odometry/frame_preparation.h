@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "sovo/image/local_contrast.h"
 #include "sovo/image/pyramid.h"
 #include "sovo/image/pyramid_pool.h"
 #include "sovo/image/stereo_frame.h"
@@ -40,6 +41,8 @@ class FramePreparation {
   int downscale_;
   int max_levels_;
   StereoRig rig_;
+  LocalContrastConfig local_contrast_;
+  std::optional<LocalContrast> left_contrast_;  ///< With lighting: vehicle.
   std::optional<Undistorter> undistorter_;
   ImageU8 left_mask_;
   ImageF raw_left_;

@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "sovo/image/local_contrast.h"
 #include "sovo/image/photometric.h"
 #include "sovo/image/static_matcher.h"
 #include "sovo/image/stereo_frame.h"
@@ -37,6 +38,12 @@ enum class DepthInit {
   kAuto,      ///< Temporal, and stereo while that fails (StereoAssist).
 };
 
+/// What lights the scene.
+enum class Lighting {
+  kWorld,    ///< Lamps that stand still, or the sun.
+  kVehicle,  ///< Lamps that move with the cameras: LocalContrast takes their light out.
+};
+
 /// Names of enum values in configuration files, found by argument-dependent lookup.
 constexpr std::array<std::pair<OdometryMode, const char*>, 3> enum_names(OdometryMode) {
   return {{{OdometryMode::kMono, "mono"},
@@ -54,12 +61,18 @@ constexpr std::array<std::pair<DepthInit, const char*>, 3> enum_names(DepthInit)
            {DepthInit::kAuto, "auto"}}};
 }
 
+constexpr std::array<std::pair<Lighting, const char*>, 2> enum_names(Lighting) {
+  return {{{Lighting::kWorld, "world"}, {Lighting::kVehicle, "vehicle"}}};
+}
+
 struct StereoOdometryConfig {
   OdometryMode mode = OdometryMode::kScale;
   InitMethod init = InitMethod::kAuto;
   double init_min_matched = 0.3;  ///< Share of good static matches that `auto` asks for.
   DepthInit depth_init = DepthInit::kStereo;
   StereoAssistConfig assist;
+  Lighting lighting = Lighting::kWorld;
+  LocalContrastConfig local_contrast;
   int downscale = 1;           ///< Whole number by which input images are reduced.
   bool deterministic = false;  ///< All stages in order on the caller's thread.
   int threads = 2;             ///< Of the loops inside the stages; changes no bit of the result.
@@ -83,6 +96,8 @@ struct StereoOdometryConfig {
       "share of good static matches that init: auto asks for");
     v("depth_init", depth_init, "where a new point's first depth interval comes from");
     v("assist", assist, "depth_init: auto, when stereo matching helps");
+    v("lighting", lighting, "what lights the scene: vehicle for lamps that move with the cameras");
+    v("local_contrast", local_contrast, "lighting: vehicle, how images are freed of their light");
     v("downscale", downscale, "whole number by which input images are reduced");
     v("deterministic", deterministic, "all stages in order on one thread");
     v("threads", threads, "of the loops inside the stages; changes no bit of the result");

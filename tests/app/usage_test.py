@@ -42,6 +42,7 @@ class Configuration(CommandTest):
                            "vo.keyframe.approach=-1", "vo.window.static_weight=nan",
                            "vo.selection.border=3", "vo.selection.least_offset=8",
                            "assist.few_points=0.9", "assist.good_keyframes=0",
+                           "lighting=lamp", "local_contrast.radius=0", "local_contrast.floor=0",
                            "loops.place_step=0", "loops.keypoints.per_image=10",
                            "loops.max_places=1", "loops.matching.sigma_px=0"]:
             with self.subTest(assignment=assignment):

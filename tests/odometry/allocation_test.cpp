@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdlib>
 #include <new>
+#include <utility>
 #include <vector>
 
 #include "odometry/odometry_test_support.h"
@@ -80,8 +81,9 @@ struct FrameAllocations {
   std::vector<long> plain, keyframe;
 };
 
-FrameAllocations count_allocations(int threads, int first, int frames) {
+FrameAllocations count_allocations(Lighting lighting, int threads, int first, int frames) {
   StereoOdometryConfig config = test_config();
+  config.lighting = lighting;
   config.threads = threads;
   config.vo.keyframe.max_keyframes = 4;  // the window is full early
   config.vo.keyframe.min_keyframes = 3;
@@ -105,8 +107,9 @@ TEST(Allocations, AFrameMakesNoneInTheSteadyState) {
   if (!kCounts) GTEST_SKIP() << "a sanitizer has allocation for itself";
   constexpr int kFrames = 48;
   constexpr int kFull = 28;  // keyframes enough by then
-  for (const int threads : {1, 2}) {
-    const FrameAllocations made = count_allocations(threads, kFull, kFrames);
+  for (const auto& [lighting, threads] :
+       {std::pair{Lighting::kWorld, 1}, {Lighting::kWorld, 2}, {Lighting::kVehicle, 1}}) {
+    const FrameAllocations made = count_allocations(lighting, threads, kFull, kFrames);
     ASSERT_GT(made.plain.size(), 10U);
     ASSERT_GT(made.keyframe.size(), 2U);
     long frames_that_do = 0;

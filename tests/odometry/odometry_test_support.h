@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <map>
 #include <memory>
@@ -91,6 +92,30 @@ inline StereoFrame unrelated_frame(int i) {
   return with_left(drive_frame(i), [i](int x, int y) {
     return ((x + 3 * i) / (9 + i % 3) + y / 7) % 2 == 0 ? 10 : 240;
   });
+}
+
+/// Frame `i` of the drive in the dark, by a lamp between the cameras that moves with them.
+inline StereoFrame lamp_frame(int i) {
+  const StereoCameras cameras = test_cameras();
+  const auto lit = [&](const SideImage& side, const CameraModel& camera) {
+    SideImage out = side;
+    auto data = std::make_shared<std::vector<std::uint8_t>>(*side.data);
+    for (int y = 0; y < side.height; ++y) {
+      for (int x = 0; x < side.width; ++x) {
+        // The beam's edge is 20 degrees from its middle.
+        const double r2 = std::pow((x - camera.cx) / camera.fx, 2) +
+                          std::pow((y - camera.cy - 20) / camera.fy, 2);
+        std::uint8_t& p = (*data)[static_cast<std::size_t>(y * side.step + x)];
+        p = static_cast<std::uint8_t>(std::lround(p * std::exp(-0.7 * r2 / (0.36 * 0.36))));
+      }
+    }
+    out.data = data;
+    return out;
+  };
+  StereoFrame frame = drive_frame(i);
+  frame.left = lit(frame.left, cameras.rig.left);
+  frame.right = lit(frame.right, cameras.rig.right);
+  return frame;
 }
 
 inline StereoOdometryConfig test_config() {

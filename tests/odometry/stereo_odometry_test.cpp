@@ -62,6 +62,22 @@ TEST(StereoOdometry, FollowsADriveInMetres) {
   }
 }
 
+TEST(StereoOdometry, LampsThatMoveWithTheCamerasAreNoMotion) {
+  StereoOdometryConfig config = test_config();
+  const auto fly = [&config] {
+    Playback run(config);
+    for (int i = 0; i < kDriveFrames; ++i) run.give(lamp_frame(i));
+    run.odometry.finish();
+    return run.odometry.refined_trajectory();
+  };
+  const auto pulled = fly();
+  config.lighting = Lighting::kVehicle;
+  const auto freed = fly();
+  EXPECT_EQ(freed.size(), static_cast<std::size_t>(kDriveFrames));
+  expect_follows_the_drive(freed, 0.015, 0.03);
+  EXPECT_GT(drive_error(pulled).rms, 3.0 * drive_error(freed).rms);
+}
+
 TEST(StereoOdometry, CovarianceGrowsWithTheWay) {
   Playback run(test_config());
   run.give_drive(0, kDriveFrames);

@@ -44,8 +44,8 @@ std::size_t distinct(const int* around, int step, std::array<int, 9>* surfaces) 
 
 }  // namespace
 
-Renderer::Renderer(const Scene& scene, const CameraModel& camera)
-    : scene_(&scene), rays_(camera), view_(scene), shader_(scene) {
+Renderer::Renderer(const Scene& scene, const CameraModel& camera, const Lamps& lamps)
+    : scene_(&scene), lamps_(lamps), rays_(camera), view_(scene), shader_(scene, lamps) {
   const auto tiles = static_cast<std::size_t>(rays_.num_tiles());
   range_.resize(tiles * RayTable::kTilePixels);
   surface_.resize(range_.size());
@@ -210,7 +210,8 @@ void Renderer::draw_particles(const SE3& T_world_camera, double t, RenderedImage
     }
     const double size = random.uniform(0.4, 1.0);
     const double distance = offset.norm();
-    const auto pixel = camera.project(T_camera_world.rotation() * offset);
+    const Vec3 in_camera = T_camera_world.rotation() * offset;
+    const auto pixel = camera.project(in_camera);
     if (!pixel || !camera.contains(*pixel) || distance < 0.15) continue;
     const int cx = static_cast<int>(std::lround(pixel->x()));
     const int cy = static_cast<int>(std::lround(pixel->y()));
@@ -221,13 +222,15 @@ void Renderer::draw_particles(const SE3& T_world_camera, double t, RenderedImage
     const double edge = std::clamp((0.5 * p.box - distance) / (0.15 * p.box), 0.0, 1.0);
     const double peak = 0.75 * own * own / (wide * wide) * edge;
     if (peak < 0.004) continue;
+    float brightness = lamps_.ambient * p.brightness;
+    if (lamps_.lit()) brightness += p.brightness * lamps_.at(in_camera.cast<float>());
     const int reach = std::min(24, static_cast<int>(std::ceil(2.5 * wide)));
     for (int y = std::max(0, cy - reach); y <= std::min(camera.height - 1, cy + reach); ++y) {
       for (int x = std::max(0, cx - reach); x <= std::min(camera.width - 1, cx + reach); ++x) {
         if (double{image->range.at(x, y)} < distance) continue;
         const double r2 = (Vec2(x, y) - *pixel).squaredNorm() / (wide * wide);
         float& light = image->light.at(x, y);
-        light += static_cast<float>(peak * std::exp(-r2)) * (p.brightness - light);
+        light += static_cast<float>(peak * std::exp(-r2)) * (brightness - light);
       }
     }
   }

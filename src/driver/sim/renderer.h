@@ -3,6 +3,7 @@
 #include <array>
 #include <vector>
 
+#include "sovo/driver/sim/lamps.h"
 #include "sovo/driver/sim/ray_table.h"
 #include "sovo/driver/sim/scene_view.h"
 #include "sovo/driver/sim/shader.h"
@@ -23,8 +24,8 @@ struct RenderedImage {
 /// that the tile may see, pixels in which surfaces meet are cast again at eight places.
 class Renderer {
  public:
-  /// The scene must outlive the renderer.
-  Renderer(const Scene& scene, const CameraModel& camera);
+  /// The scene must outlive the renderer. `lamps`: of the vehicle, in the camera's frame.
+  Renderer(const Scene& scene, const CameraModel& camera, const Lamps& lamps = {});
 
   /// The picture from a pose at time `t` of the world [s].
   void render(const SE3& T_world_camera, double t, RenderedImage* image);
@@ -47,6 +48,7 @@ class Renderer {
   void draw_particles(const SE3& T_world_camera, double t, RenderedImage* image) const;
 
   const Scene* scene_;
+  Lamps lamps_;
   RayTable rays_;
   SceneView view_;
   Shader shader_;

@@ -1,26 +1,15 @@
 #include "sovo/driver/sim/shader.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <numbers>
 
+#include "sovo/driver/sim/exp_of_minus.h"
 #include "sovo/driver/sim/kernel.h"
 
 namespace sovo::sim {
 
 namespace {
-
-/// exp(-x) for x >= 0, to a millionth; the same on every machine.
-inline float exp_of_minus(float x) {
-  const float power = std::max(-126.0F, -1.44269504F * x);
-  const auto whole = static_cast<std::int32_t>(power);
-  // 2^f, -1 < f <= 0, by its series about -1/2.
-  const float f = 0.69314718F * (power - static_cast<float>(whole) + 0.5F);
-  const float series =
-      1.0F + f * (1.0F + f * (0.5F + f * (0.16666667F + f * (0.041666667F + f * 0.0083333333F))));
-  return 0.70710678F * series * std::bit_cast<float>((whole + 127) << 23);
-}
 
 /// Joins a layer's pattern with what lies below it.
 SOVO_SIM_KERNEL void blend(const Layer& layer, float mean, int end, const float* __restrict pattern,
@@ -128,20 +117,27 @@ void Shader::light(const SurfaceView& view, RayBatch* rays, BatchFloats* light) 
   find_spots(view, s, *rays, rays->pad(), &spots);
   turn_to_world(R_world_camera_, s, *rays, &spots);
   reflect(material, spots, light);
+  BatchFloats reflectance;
+  const auto end = static_cast<std::size_t>(spots.end);
+  if (lamps_.lit()) {
+    for (std::size_t i = 0; i < end; ++i) reflectance[i] = s.tint * (*light)[i];
+  }
   const bool round = view.shape == Shape::kCylinder;
   if (round) light_cylinder(view, *rays, to_sun_, scene_->ambient, scene_->sun, &spots);
-  for (std::size_t i = 0; i < static_cast<std::size_t>(spots.end); ++i) {
-    (*light)[i] *= s.tint * (round ? spots.light[i] : s.light);
+  for (std::size_t i = 0; i < end; ++i) {
+    (*light)[i] *= s.tint * (round ? spots.light[i] : s.light) * lamps_.ambient;
   }
   if (s.foot_shade > 0.0F) {
     const auto height = static_cast<float>(T_world_camera_.translation().z());
     shade_feet(s.foot_shade, height, spots.end, spots.world_z.data(), light->data());
   }
   if (scene_->caustics >= 0) add_caustics(spots, light);
+  if (lamps_.lit()) lamps_.add_reflected(view, *rays, spots.end, reflectance, light);
   if (scene_->haze > 0.0) {
-    add_haze(static_cast<float>(scene_->haze), scene_->haze_colour, spots.end, rays->range.data(),
-             light->data());
+    add_haze(static_cast<float>(scene_->haze), lamps_.ambient * scene_->haze_colour, spots.end,
+             rays->range.data(), light->data());
   }
+  if (lamps_.lit()) lamps_.add_backscatter(*rays, spots.end, light);
 }
 
 void Shader::cover(const SurfaceView& view, RayBatch* rays, BatchFloats* opacity) const {
@@ -206,8 +202,9 @@ float Shader::sky_of(const Eigen::Vector3f& ray, float pixel_angle) const {
 
 void Shader::sky(RayBatch* rays, BatchFloats* light) const {
   for (std::size_t i = 0; i < static_cast<std::size_t>(rays->count); ++i) {
-    (*light)[i] = sky_of({rays->dx[i], rays->dy[i], rays->dz[i]}, rays->angle[i]);
+    (*light)[i] = lamps_.ambient * sky_of({rays->dx[i], rays->dy[i], rays->dz[i]}, rays->angle[i]);
   }
+  if (lamps_.lit()) lamps_.add_backscatter(*rays, rays->count, light);
 }
 
 }  // namespace sovo::sim

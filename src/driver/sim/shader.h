@@ -1,5 +1,8 @@
 #pragma once
 
+#include <utility>
+
+#include "sovo/driver/sim/lamps.h"
 #include "sovo/driver/sim/pattern_lookup.h"
 #include "sovo/driver/sim/ray_batch.h"
 #include "sovo/driver/sim/scene_view.h"
@@ -10,7 +13,7 @@ namespace sovo::sim {
 /// a pixel sees them. Batches must not be empty; the shader pads them.
 class Shader {
  public:
-  explicit Shader(const Scene& scene) : scene_(&scene) {}
+  Shader(const Scene& scene, Lamps lamps) : scene_(&scene), lamps_(std::move(lamps)) {}
 
   /// Moves the camera, and the water, to time `t` [s].
   void update(const SE3& T_world_camera, double t);
@@ -31,6 +34,7 @@ class Shader {
   float hills(double azimuth, double elevation, float pixel_angle, float beyond) const;
 
   const Scene* scene_;
+  Lamps lamps_;
   SE3 T_world_camera_;
   Mat3 R_world_camera_ = Mat3::Identity();
   Eigen::Vector3f to_sun_ = Eigen::Vector3f::Zero();  ///< In the camera's frame.

@@ -119,6 +119,27 @@ struct SensorConfig {
   }
 };
 
+/// Lamps of the vehicle, which move with its cameras.
+struct LampConfig {
+  int count = 0;
+  double spacing_m = 0.6;
+  double above_m = 0.2;
+  double beam_deg = 70.0;
+  double ambient = 0.02;
+  double backscatter = 0.1;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("count", count, "lamps: 0, 1 or 2");
+    v("spacing_m", spacing_m, "distance between two lamps [m]");
+    v("above_m", above_m, "height of the lamps above the cameras [m]");
+    v("beam_deg", beam_deg,
+      "angle across a beam within which it has more than half its light [deg]");
+    v("ambient", ambient, "share of the world's own light that is left when there are lamps");
+    v("backscatter", backscatter, "share of the light lost in haze that comes back");
+  }
+};
+
 /// Simulated cameras in a world. The file's section has what describes the world and the cameras;
 /// which pairs are asked for, and when, is said by who opens the source.
 struct SimConfig {
@@ -130,6 +151,7 @@ struct SimConfig {
   TrajectoryBody trajectory_body = TrajectoryBody::kAuto;
   Traffic traffic = Traffic::kNone;
   int threads = 2;
+  LampConfig lamps;
   SensorConfig sensor;
 
   std::string calibration;  ///< File of the cameras; empty: the world's own.
@@ -153,6 +175,7 @@ struct SimConfig {
     v("traffic", traffic,
       "vehicles that move in the street: none, car or lorry ahead, overtaking or oncoming");
     v("threads", threads, "1 or 2: cameras rendered at once; changes no pixel");
+    v("lamps", lamps, "lamps of the vehicle, which move with its cameras");
     v("sensor", sensor, "what the cameras do to the light");
   }
 };

@@ -63,7 +63,26 @@ Result<Motion> find_motion(const SimConfig& config, const StereoRig& rig) {
   return Error{motion.error() + "; the world's own trajectories are: " + known};
 }
 
+Result<void> check_lamps(const LampConfig& lamps) {
+  if (lamps.count < 0 || lamps.count > 2) return Error{"lamps.count must be 0, 1 or 2"};
+  if (!(lamps.spacing_m >= 0.0 && lamps.spacing_m <= 10.0)) {
+    return Error{"lamps.spacing_m must be in [0, 10]"};
+  }
+  if (!(std::abs(lamps.above_m) <= 10.0)) return Error{"lamps.above_m must be in [-10, 10]"};
+  if (!(lamps.beam_deg >= 5.0 && lamps.beam_deg <= 180.0)) {
+    return Error{"lamps.beam_deg must be in [5, 180]"};
+  }
+  if (!(lamps.ambient >= 0.0 && lamps.ambient <= 1.0)) {
+    return Error{"lamps.ambient must be in [0, 1]"};
+  }
+  if (!(lamps.backscatter >= 0.0 && lamps.backscatter <= 1.0)) {
+    return Error{"lamps.backscatter must be in [0, 1]"};
+  }
+  return {};
+}
+
 Result<void> check(const SimConfig& config) {
+  if (const auto valid = check_lamps(config.lamps); !valid) return valid;
   const SensorConfig& s = config.sensor;
   if (config.frames < 0) return Error{"frames must not be negative"};
   if (config.frame_rate < 0.0 || config.frame_rate > 1000.0) {
@@ -100,8 +119,10 @@ SimSource::SimSource(const SimConfig& config, Calibration calibration, Motion mo
       scene_(build_scene(config.world, motion_, config.seed, config.traffic)),
       frame_rate_(config.frame_rate > 0.0 ? config.frame_rate : own_frame_rate(config.world)),
       delivered_(choose_pairs(config, motion_, frame_rate_)),
-      left_(scene_, calibration_.rig.left),
-      right_(scene_, calibration_.rig.right),
+      left_(scene_, calibration_.rig.left,
+            place_lamps(config.lamps, calibration_.rig, Side::kLeft, scene_.haze)),
+      right_(scene_, calibration_.rig.right,
+             place_lamps(config.lamps, calibration_.rig, Side::kRight, scene_.haze)),
       truth_(scene_, calibration_.rig.left),
       left_sensor_(config.sensor, calibration_.rig.left.width, calibration_.rig.left.height),
       right_sensor_(config.sensor, calibration_.rig.right.width, calibration_.rig.right.height),

@@ -202,6 +202,9 @@ Result<void> check_config(const AppConfig& config) {
   if (!(camera.frame_rate > 0.0)) return Error{"camera.frame_rate must be positive"};
   if (config.odometry.threads < 1) return Error{"threads must be at least 1"};
   if (config.odometry.downscale < 1) return Error{"downscale must be at least 1"};
+  if (config.odometry.max_halvings < 0 || config.odometry.max_halvings > 4) {
+    return Error{"max_halvings must be 0 to 4"};
+  }
   if (config.odometry.mapping_queue < 1) return Error{"mapping_queue must be at least 1"};
   if (auto weights = check_weights(config.odometry.vo); !weights) return weights;
   if (auto selection = check_selection(config.odometry.vo.selection); !selection) return selection;

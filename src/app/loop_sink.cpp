@@ -26,6 +26,7 @@ KeyframeOutput without_points(const KeyframeOutput& keyframe) {
   out.covariance = keyframe.covariance;
   out.left = keyframe.left;
   out.right = keyframe.right;
+  out.halvings = keyframe.halvings;
   return out;
 }
 

@@ -29,6 +29,7 @@ DiagnosticReport describe(const std::string& process_name, const OdometryOutput&
       {"dropped_queue", std::to_string(output.dropped_queue + feed.dropped_queue)},
       {"rejected", std::to_string(output.rejected + feed.rejected)},
       {"segment", std::to_string(output.segment)},
+      {"halvings", std::to_string(output.halvings)},
       {"points", std::to_string(output.points)},
       {"inliers", std::to_string(output.inliers)},
       {"keyframes", std::to_string(output.keyframes)},

@@ -2,23 +2,9 @@
 
 #include <utility>
 
+#include "sovo/image/halving.h"
+
 namespace sovo {
-
-namespace {
-
-void halve(const ImageF& in, ImageF* out) {
-  out->resize(in.width() / 2, in.height() / 2);
-  for (int y = 0; y < out->height(); ++y) {
-    const float* a = in.row(2 * y);
-    const float* b = in.row(2 * y + 1);
-    float* o = out->row(y);
-    for (int x = 0; x < out->width(); ++x) {
-      o[x] = 0.25F * (a[2 * x] + a[2 * x + 1] + b[2 * x] + b[2 * x + 1]);
-    }
-  }
-}
-
-}  // namespace
 
 int ImagePyramid::num_levels_for(int width, int height, int max_levels, int min_side) {
   int levels = 1;

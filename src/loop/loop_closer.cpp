@@ -7,6 +7,7 @@
 
 #include "sovo/geometry/linear_solvers.h"
 #include "sovo/geometry/pose_covariance.h"
+#include "sovo/image/halving.h"
 
 namespace sovo {
 namespace {
@@ -60,6 +61,14 @@ double median_of(std::vector<float> values) {
   return *middle;
 }
 
+/// A keypoint of an image that was halved so often, where the whole image has it.
+Keypoint in_whole_image(Keypoint keypoint, int halvings) {
+  keypoint.u = from_halved(keypoint.u, halvings);
+  keypoint.v = from_halved(keypoint.v, halvings);
+  keypoint.level = static_cast<std::uint8_t>(keypoint.level + halvings);
+  return keypoint;
+}
+
 double angle_between(const SE3& a, const SE3& b) {
   return (a.rotation().inverse() * b.rotation()).log().norm();
 }
@@ -68,7 +77,17 @@ double angle_between(const SE3& a, const SE3& b) {
 
 LoopCloser::LoopCloser(const LoopConfig& config, const StaticMatcherConfig& matcher,
                        const StereoRig& rig, ImageU8 mask)
-    : config_(config), matcher_(matcher, rig), camera_(rig.left), mask_(std::move(mask)) {}
+    : config_(config), matcher_config_(matcher), rig_(rig), mask_(std::move(mask)) {}
+
+const LoopCloser::Resolution& LoopCloser::resolution(int halvings) {
+  const auto found = resolutions_.find(halvings);
+  if (found != resolutions_.end()) return found->second;
+  StereoRig rig = rig_;
+  rig.left = rig_.left.at_level(halvings);
+  rig.right = rig_.right.at_level(halvings);
+  Resolution made{StaticMatcher(matcher_config_, rig), reduced_mask(mask_, 1 << halvings)};
+  return resolutions_.emplace(halvings, std::move(made)).first->second;
+}
 
 bool LoopCloser::is_place(const KeyframeOutput& keyframe) const {
   if (!keyframe.scale_valid || !keyframe.left || !keyframe.right) return false;
@@ -80,7 +99,7 @@ bool LoopCloser::is_place(const KeyframeOutput& keyframe) const {
              config_.place_turn_deg * std::numbers::pi / 180.0;
 }
 
-LoopCloser::Node LoopCloser::make_node(const KeyframeOutput& keyframe) const {
+LoopCloser::Node LoopCloser::make_node(const KeyframeOutput& keyframe) {
   Node made;
   Place& place = made.place;
   place.segment = keyframe.segment;
@@ -90,10 +109,11 @@ LoopCloser::Node LoopCloser::make_node(const KeyframeOutput& keyframe) const {
   place.covariance = keyframe.covariance;
   const double rho = median_of(keyframe.inverse_depth);
   place.median_depth = rho > 0.0 ? 1.0 / rho : 1.0;
-  for (const Keypoint& keypoint : detect_keypoints(*keyframe.left, mask_, config_.keypoints)) {
-    Landmark landmark{.keypoint = keypoint};
+  const auto& [matcher, mask] = resolution(keyframe.halvings);
+  for (const Keypoint& keypoint : detect_keypoints(*keyframe.left, mask, config_.keypoints)) {
+    Landmark landmark{.keypoint = in_whole_image(keypoint, keyframe.halvings)};
     const StaticMatch match =
-        matcher_.match(*keyframe.left, *keyframe.right, keypoint.u, keypoint.v);
+        matcher.match(*keyframe.left, *keyframe.right, keypoint.u, keypoint.v);
     if (match.state == MatchState::kMatched && match.inverse_depth > 2.0F * match.sigma) {
       landmark.inverse_depth = match.inverse_depth;
       landmark.sigma = match.sigma;
@@ -166,7 +186,7 @@ std::vector<std::uint32_t> LoopCloser::candidates(std::uint32_t newer) const {
 void LoopCloser::find_loops(std::uint32_t newer) {
   const Place& place = node(newer).place;
   for (const std::uint32_t older : candidates(newer)) {
-    const auto match = match_places(camera_, node(older).place, place, config_.matching);
+    const auto match = match_places(rig_.left, node(older).place, place, config_.matching);
     if (!match) continue;
     ++counts_.matched;
     Loop loop{older, newer, *match};

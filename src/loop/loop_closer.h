@@ -112,7 +112,13 @@ class LoopCloser {
   };
 
   bool is_place(const KeyframeOutput& keyframe) const;
-  Node make_node(const KeyframeOutput& keyframe) const;
+  /// What finds landmarks in images that were halved so often.
+  struct Resolution {
+    StaticMatcher matcher;
+    ImageU8 mask;
+  };
+  const Resolution& resolution(int halvings);
+  Node make_node(const KeyframeOutput& keyframe);
   void revise(const KeyframeOutput& keyframe);
   std::optional<std::uint32_t> nearest_place(const Node& from, std::uint32_t end) const;
   std::vector<std::uint32_t> candidates(std::uint32_t newer) const;
@@ -130,9 +136,10 @@ class LoopCloser {
   GraphEdge step_edge(std::uint32_t from) const;
 
   LoopConfig config_;
-  StaticMatcher matcher_;
-  CameraModel camera_;
+  StaticMatcherConfig matcher_config_;
+  StereoRig rig_;
   ImageU8 mask_;
+  std::map<int, Resolution> resolutions_;  ///< By the number of halvings.
 
   std::uint32_t first_ = 0;  ///< Number of the oldest place.
   std::deque<Node> nodes_;

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <tuple>
+#include <utility>
 
+#include "sovo/image/halving.h"
 #include "sovo/image/photometric.h"
 
 namespace sovo {
@@ -13,24 +16,6 @@ std::int64_t steady_now_ns() {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
              std::chrono::steady_clock::now().time_since_epoch())
       .count();
-}
-
-/// A reduced pixel may be used when all its pixels may.
-ImageU8 reduce_mask(const ImageU8& mask, int factor) {
-  if (mask.empty() || factor == 1) return mask;
-  ImageU8 out(mask.width() / factor, mask.height() / factor);
-  for (int y = 0; y < out.height(); ++y) {
-    for (int x = 0; x < out.width(); ++x) {
-      std::uint8_t least = 255;
-      for (int j = 0; j < factor; ++j) {
-        for (int i = 0; i < factor; ++i) {
-          least = std::min(least, mask.at(x * factor + i, y * factor + j));
-        }
-      }
-      out.at(x, y) = least;
-    }
-  }
-  return out;
 }
 
 /// Whether every byte of a sparse grid over the image is zero: a covered or dead camera.
@@ -61,20 +46,33 @@ FramePreparation::FramePreparation(const StereoOdometryConfig& config, const Ste
     : cameras_(cameras),
       downscale_(std::max(1, config.downscale)),
       max_levels_(config.vo.tracker.max_levels),
-      rig_(cameras.rig),
       local_contrast_(config.local_contrast) {
   if (config.lighting == Lighting::kVehicle) left_contrast_.emplace(local_contrast_);
   const CameraModel raw_left = cameras.rig.left.downscaled(downscale_);
-  rig_.left = optimal_pinhole(raw_left, config.undistortion);
-  rig_.right = cameras.rig.right.downscaled(downscale_);
-  const ImageU8 raw_mask = reduce_mask(cameras.left_mask, downscale_);
-  Undistorter undistorter(raw_left, rig_.left);
-  if (undistorter.is_identity()) {
-    left_mask_ = raw_mask;
-    return;
+  StereoRig rig = cameras.rig;
+  rig.left = optimal_pinhole(raw_left, config.undistortion);
+  rig.right = cameras.rig.right.downscaled(downscale_);
+  ImageU8 mask = reduced_mask(cameras.left_mask, downscale_);
+  Undistorter undistorter(raw_left, rig.left);
+  if (!undistorter.is_identity()) {
+    mask = undistorter.valid_mask(mask);
+    undistorter_ = std::move(undistorter);
   }
-  left_mask_ = undistorter.valid_mask(raw_mask);
-  undistorter_ = std::move(undistorter);
+  add_resolutions(rig, mask, config.max_halvings);
+}
+
+void FramePreparation::add_resolutions(const StereoRig& rig, const ImageU8& mask,
+                                       int max_halvings) {
+  constexpr int kLeastSide = 80;  // with less there is no room for points
+  resolutions_.push_back({rig, mask});
+  for (int h = 1; h <= max_halvings; ++h) {
+    StereoRig halved = rig;
+    halved.left = rig.left.at_level(h);
+    halved.right = rig.right.at_level(h);
+    const auto& [l, r] = std::tie(halved.left, halved.right);
+    if (std::min({l.width, l.height, r.width, r.height}) < kLeastSide) return;
+    resolutions_.push_back({halved, reduced_mask(mask, 1 << h)});
+  }
 }
 
 std::string FramePreparation::check_side(const SideImage& side, bool is_left) const {
@@ -100,7 +98,19 @@ bool FramePreparation::takes_bytes(const SideImage& left) const {
          cameras_.left_photometric.empty();
 }
 
-MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver* observer) {
+void FramePreparation::write_left(const SideImage& left, ImageF* image) {
+  if (undistorter_ && takes_bytes(left)) {
+    undistorter_->apply(left.data->data(), left.step, image);
+  } else if (undistorter_) {
+    to_float(left, cameras_.left_photometric, downscale_, &raw_left_);
+    undistorter_->apply(raw_left_, image);
+  } else {
+    to_float(left, cameras_.left_photometric, downscale_, image);
+  }
+}
+
+MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver* observer,
+                                         int halvings) {
   MonoFrame out;
   out.stamp_ns = frame.stamp_ns;
   // Without its light an image does not depend on its exposure.
@@ -108,13 +118,10 @@ MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver
   auto pyramid = left_pyramids_.take();
   std::optional<ScopedStage> stage(std::in_place, observer, Stage::kUndistortion);
   pyramid->rebuild(max_levels_, [&](ImageF* image) {
-    if (undistorter_ && takes_bytes(frame.left)) {
-      undistorter_->apply(frame.left.data->data(), frame.left.step, image);
-    } else if (undistorter_) {
-      to_float(frame.left, cameras_.left_photometric, downscale_, &raw_left_);
-      undistorter_->apply(raw_left_, image);
-    } else {
-      to_float(frame.left, cameras_.left_photometric, downscale_, image);
+    write_left(frame.left, image);
+    for (int h = 0; h < halvings; ++h) {
+      std::swap(*image, unhalved_left_);
+      halve(unhalved_left_, image);
     }
     if (left_contrast_) left_contrast_->apply(image);
     stage.emplace(observer, Stage::kPyramid);
@@ -123,9 +130,14 @@ MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver
   return out;
 }
 
-ImagePyramid FramePreparation::prepare_right(const SideImage& right) const {
+ImagePyramid FramePreparation::prepare_right(const SideImage& right, int halvings) const {
   ImageF image;
   to_float(right, cameras_.right_photometric, downscale_, &image);
+  for (int h = 0; h < halvings; ++h) {
+    ImageF halved;
+    halve(image, &halved);
+    image = std::move(halved);
+  }
   if (left_contrast_) LocalContrast(local_contrast_).apply(&image);
   const int levels = ImagePyramid::num_levels_for(image.width(), image.height(), max_levels_);
   return {std::move(image), levels};

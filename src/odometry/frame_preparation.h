@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "sovo/image/local_contrast.h"
 #include "sovo/image/pyramid.h"
@@ -15,37 +16,52 @@ namespace sovo {
 
 /// From raw stereo frames to what is tracked: the left image undistorted, the right one as its
 /// camera sees it, both photometrically corrected and reduced.
+///
+/// What a map is built from may be halved further, as often as `halvings` says; its pixel (x, y)
+/// then covers 2^halvings of the whole image's in each direction, as in a pyramid.
 class FramePreparation {
  public:
   FramePreparation(const StereoOdometryConfig& config, const StereoCameras& cameras);
 
+  /// How often images can be halved: as the configuration has it, while they are large enough.
+  int max_halvings() const { return static_cast<int>(resolutions_.size()) - 1; }
+
   /// Left: the tracked pinhole camera; right: raw, with distortion. Both reduced.
-  const StereoRig& rig() const { return rig_; }
+  const StereoRig& rig(int halvings = 0) const { return at(halvings).rig; }
   /// 0 where the tracked left image must not be used; empty when all may be.
-  const ImageU8& left_mask() const { return left_mask_; }
+  const ImageU8& left_mask(int halvings = 0) const { return at(halvings).left_mask; }
 
   /// What is wrong with a side: missing, of another size, black; empty when nothing is.
   std::string check_side(const SideImage& side, bool is_left) const;
 
   /// Left image ready to be tracked. Precondition: `check_side` found nothing.
-  MonoFrame prepare_left(const StereoFrame& frame, StageObserver* observer);
+  MonoFrame prepare_left(const StereoFrame& frame, StageObserver* observer, int halvings = 0);
 
   /// Right image ready for matching and scale optimization.
-  ImagePyramid prepare_right(const SideImage& right) const;
+  ImagePyramid prepare_right(const SideImage& right, int halvings = 0) const;
 
  private:
+  struct Resolution {
+    StereoRig rig;
+    ImageU8 left_mask;
+  };
+  const Resolution& at(int halvings) const {
+    return resolutions_[static_cast<std::size_t>(halvings)];
+  }
+  void add_resolutions(const StereoRig& rig, const ImageU8& mask, int max_halvings);
+  void write_left(const SideImage& left, ImageF* image);
   /// Whether the pixels are resampled as they come, with nothing to be done before.
   bool takes_bytes(const SideImage& left) const;
 
   StereoCameras cameras_;
   int downscale_;
   int max_levels_;
-  StereoRig rig_;
+  std::vector<Resolution> resolutions_;  ///< By the number of halvings.
   LocalContrastConfig local_contrast_;
   std::optional<LocalContrast> left_contrast_;  ///< With lighting: vehicle.
   std::optional<Undistorter> undistorter_;
-  ImageU8 left_mask_;
   ImageF raw_left_;
+  ImageF unhalved_left_;
   PyramidPool left_pyramids_;
 };
 

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "sovo/image/halving.h"
 #include "sovo/odometry/trajectory_recorder.h"
 
 namespace sovo {
@@ -11,6 +12,9 @@ namespace sovo {
 namespace {
 
 constexpr std::size_t kMatchBlock = 64;
+/// Frames from one search for stereo depth to the next while the map begins: two views take their
+/// time, and meanwhile a camera may be uncovered, or come to another texture.
+constexpr std::uint32_t kStereoEvery = 5;
 /// So many keyframes wait for a scale, the newest ones: a map may go without one for days.
 constexpr std::size_t kMostWaiting = 200;
 
@@ -34,10 +38,14 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// Gives `keyframe` its points, with the grey levels of its image.
-void set_points(const KeyframePoints& points, const ImageF& image, KeyframeOutput* keyframe) {
+/// Gives `keyframe` its points, with the grey levels of its image, which is halved so often.
+void set_points(const KeyframePoints& points, const ImageF& image, int halvings,
+                KeyframeOutput* keyframe) {
   keyframe->u = points.u;
   keyframe->v = points.v;
+  for (auto* positions : {&keyframe->u, &keyframe->v}) {
+    for (float& x : *positions) x = from_halved(x, halvings);
+  }
   keyframe->inverse_depth = points.inverse_depth;
   keyframe->sigma = points.sigma;
   keyframe->intensity.reserve(points.size());
@@ -52,6 +60,12 @@ void set_points(const KeyframePoints& points, const ImageF& image, KeyframeOutpu
 DepthProposal proposal_of(const StaticMatch& match) {
   if (match.state != MatchState::kMatched) return {};
   return {match.inverse_depth, match.sigma};
+}
+
+/// Halving averages the noise of four pixels, so that half the contrast is enough.
+DirectConfig for_halved(DirectConfig config, int halvings) {
+  config.selection.least_offset /= 1 << std::min(halvings, 1);
+  return config;
 }
 
 /// Every how many pixels one is a scout: one in eight, or more where that would make fewer than
@@ -82,71 +96,80 @@ std::pair<float, float> range_of_scouts(const std::vector<StaticMatch>& matches,
 }  // namespace
 
 MapSegment::MapSegment(const StereoOdometryConfig& config, const FramePreparation& preparation,
-                       std::uint32_t index, const SE3& T_odom_left_start, WorkerPool* pool,
-                       StageObserver* observer)
+                       std::uint32_t index, const SE3& T_odom_left_start, int halvings,
+                       WorkerPool* pool, StageObserver* observer)
     : config_(config),
       preparation_(preparation),
       index_(index),
       T_odom_left_start_(T_odom_left_start),
+      halvings_(halvings),
       pool_(pool),
       observer_(observer),
-      vo_(config.vo, preparation.rig().left, preparation.left_mask(), config.seed, pool),
-      matcher_(config.matcher, preparation.rig()),
-      optimizer_(config.scale, preparation.rig()),
+      vo_(for_halved(config.vo, halvings), rig().left, preparation.left_mask(halvings), config.seed,
+          pool),
+      matcher_(config.matcher, rig()),
+      optimizer_(config.scale, rig()),
       filter_(config.filter),
       assist_(config.assist),
       scale_path_until_(T_odom_left_start.translation()) {}
 
 bool MapSegment::initialize(const MonoFrame& frame, const SideImage* right) {
-  // Two views take their time; meanwhile a camera may be uncovered, or come to another texture.
-  constexpr std::uint32_t kStereoEvery = 5;
   const bool only_stereo = config_.init == InitMethod::kStereo;
-  const bool due = only_stereo || attempts_++ % kStereoEvery == 0;
-  if (config_.init != InitMethod::kTwoView && right != nullptr && due &&
-      initialize_from_stereo(frame, *right)) {
-    two_view_initializer_.reset();
-    two_view_first_.reset();
-    return true;
+  const bool due = only_stereo || attempts_ % kStereoEvery == 0;
+  ++attempts_;
+  stereo_problem_.clear();
+  if (config_.init != InitMethod::kTwoView && right != nullptr && due) {
+    if (initialize_from_stereo(frame, *right)) {
+      two_view_initializer_.reset();
+      two_view_first_.reset();
+      return true;
+    }
   }
   if (!only_stereo) return initialize_from_two_views(frame, right);
   if (right == nullptr) reason_ = "waiting for a right image to begin from stereo depth";
   return false;
 }
 
+bool MapSegment::wants_halving() const {
+  return !stereo_problem_.empty() && attempts_ > kStereoEvery;
+}
+
 bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage& right) {
   const std::vector<SelectedPixel> pixels =
       vo_.select_pixels(frame, config_.vo.points.active_points);
   const auto right_pyramid =
-      std::make_shared<const ImagePyramid>(preparation_.prepare_right(right));
+      std::make_shared<const ImagePyramid>(preparation_.prepare_right(right, halvings_));
   const std::vector<StaticMatch> matches = match_all(*frame.pyramid, *right_pyramid, pixels);
   std::vector<StartPoint> points(pixels.size());
   std::size_t good = 0;
   std::size_t in_view = 0;
-  double relative_sigma = 0.0;
+  double scale_information = 0.0;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     points[i] = {pixels[i], proposal_of(matches[i])};
     in_view += matches[i].state != MatchState::kOutOfView ? 1 : 0;
     if (points[i].depth.sigma <= 0.0F) continue;
     ++good;
-    relative_sigma += points[i].depth.sigma / std::max(points[i].depth.rho, 1e-6F);
+    scale_information += std::pow(points[i].depth.rho / points[i].depth.sigma, 2);
   }
   // Depths of weak texture are rougher: it takes more of them.
   const bool weak = !pixels.empty() && pixels.front().threshold_share < 1.0F;
   const std::size_t fewest = weak ? 200 : 100;
   const double share = in_view > 0 ? static_cast<double>(good) / static_cast<double>(in_view) : 0.0;
   if (good < fewest || (config_.init == InitMethod::kAuto && share < config_.init_min_matched)) {
-    reason_ = "only " + std::to_string(good) + " of " + std::to_string(in_view) +
-              " static stereo matches are good: too little texture, repetitive texture, or a "
-              "wrong calibration (sovo calib check)";
+    stereo_problem_ =
+        "only " + std::to_string(good) + " of " + std::to_string(in_view) +
+        " static stereo matches are good: too little texture, repetitive texture, or a "
+        "wrong calibration (sovo calib check)";
+    reason_ = stereo_problem_;
     return false;
   }
-  if (stereo()) vo_.use_static_residuals(preparation_.rig());
+  if (stereo()) vo_.use_static_residuals(rig());
   vo_.begin(frame, T_odom_left_start_, points, stereo() ? right_pyramid : nullptr);
   // Matching errors are independent; what remains is common to all (calibration).
-  filter_.lock_initial(relative_sigma / static_cast<double>(good) / std::sqrt(good),
-                       frame.stamp_ns);
+  filter_.lock_initial(1.0 / std::sqrt(scale_information), frame.stamp_ns);
   publish_scale(nullptr, true);
   initialized_ = true;
+  stereo_problem_.clear();
   reason_.clear();
   MappingOutcome start;
   start.map.active_points = vo_.window().num_active_points();
@@ -172,9 +195,9 @@ bool MapSegment::initialize_from_two_views(const MonoFrame& frame, const SideIma
   PixelSelectorConfig selector = config_.vo.selection;
   selector.seed = config_.seed + 1;
   two_view_selector_ = std::make_unique<PixelSelector>(selector);
-  const ImageU8& mask = preparation_.left_mask();
+  const ImageU8& mask = preparation_.left_mask(halvings_);
   two_view_first_ = frame;
-  if (!two_view_initializer_->set_first(frame.stamp_ns, frame.pyramid, preparation_.rig().left,
+  if (!two_view_initializer_->set_first(frame.stamp_ns, frame.pyramid, rig().left,
                                         mask.empty() ? nullptr : &mask, two_view_selector_.get())) {
     reason_ = "beginning from two views: " + two_view_initializer_->reason();
     two_view_initializer_.reset();
@@ -271,7 +294,7 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
   const bool use_right = tracked.wants_keyframe && right != nullptr;
   if (use_right) {
     const auto start = std::chrono::steady_clock::now();
-    job.right = std::make_shared<const ImagePyramid>(preparation_.prepare_right(*right));
+    job.right = std::make_shared<const ImagePyramid>(preparation_.prepare_right(*right, halvings_));
     job.pyramid_seconds = seconds_since(start);
     // Depths of an unscaled map are no metres.
     const bool metric = filter_.locked();
@@ -343,7 +366,7 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
     correction.first_lock = !was_locked;
     record.correction = vo_.apply(correction);
     if (correction.first_lock) refined_until_ = 0;  // it rescales what was built before
-    if (stereo()) vo_.use_static_residuals(preparation_.rig());
+    if (stereo()) vo_.use_static_residuals(rig());
   }
   if (was_locked) {
     extend_scale_path(position, sigma_before);
@@ -397,6 +420,7 @@ KeyframeOutput MapSegment::first_keyframe(const MonoFrame& frame,
   out.T_odom_left = vo_.window().newest().T_world_camera();
   out.left = frame.pyramid;
   out.right = right;
+  out.halvings = halvings_;
   return out;
 }
 
@@ -409,12 +433,13 @@ KeyframeOutput MapSegment::new_keyframe(const ImagePyramidPtr& right) const {
   out.scale_valid = metric();
   out.T_odom_left = vo_.window().newest().T_world_camera();
   out.log_scale = vo_.log_scale();
-  set_points(s.points, s.pyramid->level(0), &out);
+  set_points(s.points, s.pyramid->level(0), halvings_, &out);
   out.covariance = vo_.reference()->covariance;
   out.covariance.topLeftCorner<3, 3>() +=
       scale_status().position_covariance(out.T_odom_left.translation());
   out.left = s.pyramid;
   out.right = right;
+  out.halvings = halvings_;
   return out;
 }
 
@@ -424,7 +449,7 @@ KeyframeOutput MapSegment::own_points(const KeyframeState& state) const {
   out.id = state.id;
   out.segment = index_;
   out.stamp_ns = state.stamp_ns;
-  set_points(state.points, state.pyramid->level(0), &out);
+  set_points(state.points, state.pyramid->level(0), halvings_, &out);
   return out;
 }
 

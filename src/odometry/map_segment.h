@@ -52,21 +52,32 @@ struct MappingOutcome {
 /// One map from its beginning to its loss: the direct odometry of the left camera, its
 /// initialization, and the scale filter.
 ///
+/// It sees images that are halved `halvings` times (FramePreparation); the keyframes that it hands
+/// out have their points in the whole image all the same.
+///
 /// `initialize` and `track` belong to the tracking thread, `map` and `finish_scale` to the mapping
 /// thread; `estimate_scale` may run anywhere.
 class MapSegment {
  public:
   MapSegment(const StereoOdometryConfig& config, const FramePreparation& preparation,
-             std::uint32_t index, const SE3& T_odom_left_start, WorkerPool* pool,
+             std::uint32_t index, const SE3& T_odom_left_start, int halvings, WorkerPool* pool,
              StageObserver* observer);
 
   std::uint32_t index() const { return index_; }
+  int halvings() const { return halvings_; }
   bool initialized() const { return initialized_; }
 
   /// Tries to begin the map with this frame; `right` may be null. Returns true when the map has
   /// begun; `T_odom_left` is then this frame's pose. `reason()` tells what is missing.
   bool initialize(const MonoFrame& frame, const SideImage* right);
   const std::string& reason() const { return reason_; }
+  /// Whether stereo depth was sought in the last frame, and in those of some time before, in vain:
+  /// smaller images may do.
+  bool wants_halving() const;
+  /// Why stereo depth did not do in the last frame; empty: it was not sought.
+  const std::string& stereo_problem() const { return stereo_problem_; }
+  /// Tries to begin the map with the stereo depth of this frame alone.
+  bool initialize_from_stereo(const MonoFrame& frame, const SideImage& right);
 
   /// Tracks a frame. The limit of acceleration counts once the map has metres.
   TrackedFrame track(const MonoFrame& frame) {
@@ -93,12 +104,12 @@ class MapSegment {
   std::optional<MappingOutcome> take_start_outcome();
 
  private:
-  bool initialize_from_stereo(const MonoFrame& frame, const SideImage& right);
   bool initialize_from_two_views(const MonoFrame& frame, const SideImage* right);
   bool finish_two_views(const MonoFrame& frame, const SideImage* right);
   std::vector<StaticMatch> match_all(const ImagePyramid& left, const ImagePyramid& right,
                                      const std::vector<SelectedPixel>& pixels) const;
   DepthProposer stereo_proposer(const ImagePyramidPtr& left, const ImagePyramid& right) const;
+  const StereoRig& rig() const { return preparation_.rig(halvings_); }
   bool metric() const { return filter_.locked() && config_.mode != OdometryMode::kMono; }
   /// Whether new pixels get their depths from the right image.
   bool matches_new_pixels() const;
@@ -116,6 +127,7 @@ class MapSegment {
   const FramePreparation& preparation_;
   std::uint32_t index_;
   SE3 T_odom_left_start_;
+  int halvings_;
   WorkerPool* pool_;
   StageObserver* observer_;
 
@@ -129,6 +141,7 @@ class MapSegment {
   bool initialized_ = false;
   bool broken_ = false;
   std::uint32_t attempts_ = 0;  ///< Frames given to `initialize`.
+  std::string stereo_problem_;  ///< In the last of them.
   std::string reason_;
   std::unique_ptr<TwoViewInitializer> two_view_initializer_;
   std::unique_ptr<PixelSelector> two_view_selector_;

@@ -77,6 +77,7 @@ struct OdometryOutput {
   std::uint64_t dropped_queue = 0;  ///< Frames dropped because mapping or tracking was late.
   std::uint64_t rejected = 0;       ///< Frames refused (bad stamp, size, content).
   std::uint32_t reset_counter = 0;
+  int halvings = 0;             ///< How often images are halved to be tracked.
   std::uint32_t points = 0;     ///< Active in the window.
   std::uint32_t inliers = 0;    ///< Pixels of the tracking reference that agree.
   std::uint32_t keyframes = 0;  ///< In the window.
@@ -114,6 +115,7 @@ struct KeyframeOutput {
   Mat6 covariance = Mat6::Zero();  ///< Of T_odom_left, as in OdometryOutput.
   ImagePyramidPtr left;            ///< Its undistorted image.
   ImagePyramidPtr right;           ///< The raw one that was taken with it; null: there was none.
+  int halvings = 0;                ///< How often both were halved, unlike `u` and `v`.
 };
 
 /// One run of the scale optimizer, a line of `--keyframes`.

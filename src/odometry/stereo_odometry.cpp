@@ -55,11 +55,14 @@ class StereoOdometry::Impl {
     last_stamp_ns_ = frame.stamp_ns;
     const std::string right_problem = preparation_.check_side(frame.right, false);
     const SideImage* right = right_problem.empty() ? &frame.right : nullptr;
-    const MonoFrame left = preparation_.prepare_left(frame, observer_);
+    const MonoFrame left = preparation_.prepare_left(frame, observer_, segment_->halvings());
     if (segment_->initialized()) {
       follow(left, right, right_problem, &out);
+    } else if (segment_->initialize(left, right)) {
+      begin_map(left, &out);
     } else {
-      initialize(left, right, &out);
+      out.reason = segment_->reason();
+      if (segment_->wants_halving()) initialize_halved(frame, &out);
     }
     fill_counters(&out);
     sink_->on_frame(out);
@@ -97,22 +100,42 @@ class StereoOdometry::Impl {
     recorder_.close_segment(segment_->vo().keyframes());
   }
 
-  void begin_segment(const SE3& T_odom_left) {
+  std::unique_ptr<MapSegment> new_segment(std::uint32_t index, const SE3& T_odom_left,
+                                          int halvings) {
+    return std::make_unique<MapSegment>(config_, preparation_, index, T_odom_left, halvings, &pool_,
+                                        observer_);
+  }
+
+  void set_segment(std::unique_ptr<MapSegment> segment) {
     if (threads_) threads_->set_segment(nullptr);
-    segment_ = std::make_unique<MapSegment>(config_, preparation_, next_segment_++, T_odom_left,
-                                            &pool_, observer_);
+    segment_ = std::move(segment);
     if (threads_) threads_->set_segment(segment_.get());
+  }
+
+  void begin_segment(const SE3& T_odom_left) {
+    set_segment(new_segment(next_segment_++, T_odom_left, 0));
     failures_ = 0;
     distance_ = 0.0;
     published_.reset();
   }
 
-  void initialize(const MonoFrame& left, const SideImage* right, OdometryOutput* out) {
-    out->state = OdometryState::kInitializing;
-    if (!segment_->initialize(left, right)) {
-      out->reason = segment_->reason();
+  /// What is blurred, noisy or pale at full resolution may be clear enough in smaller images.
+  void initialize_halved(const StereoFrame& frame, OdometryOutput* out) {
+    for (int halvings = 1; halvings <= preparation_.max_halvings(); ++halvings) {
+      auto segment = new_segment(segment_->index(), last_pose_, halvings);
+      const MonoFrame left = preparation_.prepare_left(frame, observer_, halvings);
+      if (!segment->initialize_from_stereo(left, frame.right)) continue;
+      const std::string why = segment_->stereo_problem();
+      set_segment(std::move(segment));
+      begin_map(left, out);
+      out->reason = "images are reduced to 1/" + std::to_string(1 << halvings) +
+                    " of their size, for in whole ones " + why;
       return;
     }
+  }
+
+  /// The segment's first pose, after `initialize`.
+  void begin_map(const MonoFrame& left, OdometryOutput* out) {
     if (auto start = segment_->take_start_outcome()) {
       publish_keyframes(*start);
       if (start->scale_job) finish_scale(*start->scale_job);
@@ -221,6 +244,7 @@ class StereoOdometry::Impl {
     out->dropped_queue = dropped_;
     out->reset_counter = reset_counter_;
     out->segment = segment_->index();
+    out->halvings = segment_->halvings();
     out->distance_m = distance_;
     out->queue_depth = threads_ ? static_cast<std::uint32_t>(threads_->queue_depth()) : 0;
     const std::lock_guard lock(map_mutex_);

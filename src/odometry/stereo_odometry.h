@@ -74,6 +74,7 @@ struct StereoOdometryConfig {
   Lighting lighting = Lighting::kWorld;
   LocalContrastConfig local_contrast;
   int downscale = 1;           ///< Whole number by which input images are reduced.
+  int max_halvings = 2;        ///< Images in which no map can begin are halved so often at most.
   bool deterministic = false;  ///< All stages in order on the caller's thread.
   int threads = 2;             ///< Of the loops inside the stages; changes no bit of the result.
   int seed = 0;
@@ -99,6 +100,8 @@ struct StereoOdometryConfig {
     v("lighting", lighting, "what lights the scene: vehicle for lamps that move with the cameras");
     v("local_contrast", local_contrast, "lighting: vehicle, how images are freed of their light");
     v("downscale", downscale, "whole number by which input images are reduced");
+    v("max_halvings", max_halvings,
+      "images that are too blurred, noisy or pale for a map to begin are halved so often at most");
     v("deterministic", deterministic, "all stages in order on one thread");
     v("threads", threads, "of the loops inside the stages; changes no bit of the result");
     v("seed", seed, "of every random choice");

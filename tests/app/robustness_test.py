@@ -64,8 +64,17 @@ class Robustness(SimTest):
     def test_a_twelfth_of_the_light_without_exposure_control(self):
         dim = {"light_from_s": 0, "auto_exposure": "false", "exposure_ms": 8}
         self.expect_whole(*self.fly("hall", "--frames", 80, light_factor=0.08, **dim), 0.1)
-        result = self.fly("hall", "--frames", 20, code=FAILED, light_factor=0.04, **dim)
+        result = self.fly("hall", "--frames", 20, code=FAILED, light_factor=0.015, **dim)
         self.assertIn("no frame was tracked", result.stderr)
+
+    def test_what_whole_images_do_not_show_smaller_ones_do(self):
+        dim = {"light_from_s": 0, "auto_exposure": "false", "exposure_ms": 8}
+        for world, sensor, error_m in (("hall", {"light_factor": 0.04, **dim}, 0.1),
+                                       ("pool", {"veil": 0.97}, 0.06)):
+            truth, live = self.fly(world, "--frames", 85, calibration=(), **sensor)
+            self.assertIn("images are reduced to 1/2 of their size", self.log)
+            self.assertEqual(len(live), len(truth) - 5)
+            self.assertLess(largest_error(live, truth, live[0][0]), error_m)
 
     def test_lamps_of_the_vehicle_light_the_dark(self):
         # With lighting: world 0.09 m off, and lost.
@@ -74,7 +83,7 @@ class Robustness(SimTest):
                                         "lighting=vehicle", *light), 0.02)
 
     def test_nothing_is_claimed_where_nothing_can_be_seen(self):
-        result = self.fly("pool", "--frames", 40, code=FAILED, veil=0.97)
+        result = self.fly("pool", "--frames", 40, code=FAILED, veil=0.99)
         self.assertIn("no frame was tracked", result.stderr)
         self.assertIn("INITIALIZING: beginning from two views: too little texture", result.stderr)
 

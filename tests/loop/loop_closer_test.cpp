@@ -6,6 +6,7 @@
 
 #include "loop/loop_test_support.h"
 #include "sovo/geometry/pose_covariance.h"
+#include "sovo/image/halving.h"
 
 namespace sovo {
 namespace {
@@ -35,15 +36,20 @@ struct Views {
   ImagePyramidPtr left, right;
 };
 
-/// What the cameras see at keyframe `i`; rendered once a program.
-const Views& views_of(int i) {
+/// What the cameras see at keyframe `i`, halved so often; rendered once a program.
+const Views& views_of(int i, int halvings) {
   static const test::SyntheticScene scene(3);
-  static std::map<int, Views> rendered;
-  Views& views = rendered[i];
+  static std::map<std::pair<int, int>, Views> rendered;
+  Views& views = rendered[{i, halvings}];
   if (views.left) return views;
   const StereoRig rig = small_rig();
   const SE3 pose = lap_pose(i);
-  const auto pyramid_of = [](ImageF image) {
+  const auto pyramid_of = [halvings](ImageF image) {
+    for (int h = 0; h < halvings; ++h) {
+      ImageF half;
+      halve(image, &half);
+      image = std::move(half);
+    }
     const int levels = ImagePyramid::num_levels_for(image.width(), image.height());
     return std::make_shared<const ImagePyramid>(std::move(image), levels);
   };
@@ -56,6 +62,9 @@ const Views& views_of(int i) {
 class DriftingOdometry {
  public:
   explicit DriftingOdometry(unsigned seed) : random_(seed) {}
+
+  /// Its images are halved so often from now on.
+  void halve_images(int halvings) { halvings_ = halvings; }
 
   /// Keyframe `i`, as it is new; `first`: of a segment, whose poses go on from `T_odom_left`.
   KeyframeOutput next(int i) {
@@ -82,8 +91,9 @@ class DriftingOdometry {
     out.T_odom_left = pose_;
     out.covariance = covariance_;
     out.inverse_depth = std::vector<float>(10, 0.3F);
-    out.left = views_of(i).left;
-    out.right = views_of(i).right;
+    out.left = views_of(i, halvings_).left;
+    out.right = views_of(i, halvings_).right;
+    out.halvings = halvings_;
     trajectory_.push_back({out.stamp_ns, pose_});
     truth_.push_back(lap_pose(0).inverse() * lap_pose(i));
     return out;
@@ -113,6 +123,7 @@ class DriftingOdometry {
   std::optional<int> last_;
   Mat6 covariance_ = Mat6::Zero();
   std::uint32_t segment_ = 0, id_ = 0;
+  int halvings_ = 0;
   std::vector<TrajectoryPose> trajectory_;
   std::vector<SE3> truth_;
 };
@@ -194,6 +205,20 @@ TEST(LoopCloser, ConnectsWhatWasLost) {
   LoopCloser closer = make_closer();
   for (int i = 0; i < kLap; ++i) closer.add(odometry.next(i));
   odometry.lose(SE3(SO3::exp(Vec3(0.4, -1.5, 0.7)), Vec3(7.0, 2.0, -3.0)));
+  for (int i = kLap + 3; i < 2 * kLap; ++i) closer.add(odometry.next(i));
+  closer.finish();
+  EXPECT_GT(odometry.rms(odometry.trajectory()), 1.0);
+  EXPECT_LT(odometry.rms(closer.corrected(odometry.trajectory())), 0.06);
+}
+
+TEST(LoopCloser, KnowsAPlaceByImagesOfHalfTheSize) {
+  DriftingOdometry odometry(2);
+  LoopConfig config = small_config();
+  config.lost_support = 0.1;  // small images share few corners with whole ones
+  LoopCloser closer = make_closer(config);
+  for (int i = 0; i < kLap; ++i) closer.add(odometry.next(i));
+  odometry.lose(SE3(SO3::exp(Vec3(0.4, -1.5, 0.7)), Vec3(7.0, 2.0, -3.0)));
+  odometry.halve_images(1);
   for (int i = kLap + 3; i < 2 * kLap; ++i) closer.add(odometry.next(i));
   closer.finish();
   EXPECT_GT(odometry.rms(odometry.trajectory()), 1.0);

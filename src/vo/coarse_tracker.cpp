@@ -119,6 +119,17 @@ double expected_inlier_ratio(const TrackerConfig& config, const LastTracking& la
   return std::min(steady, config.sure_inlier_ratio);
 }
 
+/// The frame fits as well as the last one did, or, where the image became blurred or the last fit
+/// was exceptional, so well that no wrong pose does.
+bool is_as_expected(const TrackerConfig& config, const LastTracking& last,
+                    const TrackingResult& found) {
+  if (!(last.rmse > 0.0)) return false;
+  return (found.rmse < config.lost_rmse_factor * last.rmse &&
+          found.inlier_ratio > expected_inlier_ratio(config, last)) ||
+         (found.correlation > config.sure_correlation &&
+          found.inlier_ratio > config.sure_inlier_ratio);
+}
+
 /// What fits by chance lies anywhere: a pose to which the motion led needs less to be believed.
 double least_correlation(const TrackerConfig& config, const LastTracking& last,
                          const TrackingResult& found, double mean_rho) {
@@ -335,13 +346,13 @@ TrackingResult CoarseTracker::track(const TrackingReference& reference, const Im
     TrackingResult tried =
         try_hypothesis(reference, pyramid, exposure_s, affine_guess, hypotheses[i]);
     tried.hypothesis = static_cast<int>(i);
-    if (tried.good && (!best.good || tried.rmse < best.rmse)) best = tried;
-    best.as_expected = last.rmse > 0.0 && best.rmse < config_.lost_rmse_factor * last.rmse &&
-                       best.inlier_ratio > expected_inlier_ratio(config_, last);
-    if (best.good && best.as_expected) break;
+    if (!tried.good || (best.good && tried.rmse >= best.rmse)) continue;
+    best = tried;
+    best.correlation = correlation(reference.levels[0], pyramid.level(0), best.T_current_reference);
+    best.as_expected = is_as_expected(config_, last, best);
+    if (best.as_expected) break;
   }
   if (!best.good) return best;
-  best.correlation = correlation(reference.levels[0], pyramid.level(0), best.T_current_reference);
   best.good = best.rmse < config_.max_rmse && best.inlier_ratio > config_.min_inlier_ratio &&
               best.correlation > least_correlation(config_, last, best, reference.mean_rho);
   return best;

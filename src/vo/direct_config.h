@@ -13,6 +13,9 @@ struct TrackerConfig {
   /// when more of the reference pixels in view agree, too, or hardly fewer than in the last frame.
   /// Right poses seldom have less, also under blur; wrong ones that fit by chance have up to 0.7.
   double sure_inlier_ratio = 0.8;
+  /// Or, whatever the last RMSE was, when with that share of inliers reference and image correlate
+  /// more than this. Of wrong poses under blows, after gaps and in races none had more than 0.71.
+  double sure_correlation = 0.85;
   double max_rmse = 40.0;         ///< Lost above [grey levels].
   double min_inlier_ratio = 0.5;  ///< Lost below: reference pixels in view that agree.
   /// Lost below: correlation of reference and image. Right poses have 0.6 and more, on real clips
@@ -33,6 +36,8 @@ struct TrackerConfig {
     v("lost_rmse_factor", lost_rmse_factor, "a motion hypothesis is taken below this x last RMSE");
     v("sure_inlier_ratio", sure_inlier_ratio,
       "and above this share of pixels in view that agree, or little below the last");
+    v("sure_correlation", sure_correlation,
+      "or, with that share, above this correlation of reference and image, whatever the RMSE");
     v("max_rmse", max_rmse, "tracking is lost above [grey levels]");
     v("min_inlier_ratio", min_inlier_ratio, "tracking is lost below");
     v("min_correlation", min_correlation, "tracking is lost below");

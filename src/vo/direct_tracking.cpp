@@ -24,7 +24,7 @@ void add_rotations(const SE3& around, std::vector<SE3>* hypotheses) {
 /// Motions to try when none is known: translations along each axis in shares of the mean depth,
 /// and rotations.
 std::vector<SE3> unknown_motions(const SE3& around, double mean_rho) {
-  constexpr std::array<double, 5> kShares = {0.02, 0.04, 0.07, 0.11, 0.16};
+  constexpr std::array<double, 7> kShares = {0.02, 0.04, 0.07, 0.11, 0.16, 0.23, 0.32};
   std::vector<SE3> out = {around};
   for (const double share : kShares) {
     for (int axis = 0; axis < 3; ++axis) {

@@ -115,6 +115,13 @@ class Robustness(SimTest):
             self.assertEqual(len(truth), pairs)
             self.expect_whole(truth, live, 0.05)
 
+    def test_a_map_begins_at_six_metres_a_frame(self):
+        # Up to a third of the mean depth; the motion is not known yet.
+        for rate, direction in ((3.3, ()), (4, ("--reverse",))):
+            truth, live = self.fly("street", "--trajectory", "expressway", "--frames", 12,
+                                   *direction, "--set", f"sim.frame_rate={rate}", calibration=())
+            self.expect_whole(truth, live, 0.5)
+
     def test_a_lorry_close_ahead_hides_the_road(self):
         # Few points are left, and they leave the view soon; where the lorry turns it covers more.
         flights = ((("town", "--reverse", "--start", 100, "--frames", 45), 0.08),

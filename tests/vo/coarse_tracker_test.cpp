@@ -223,6 +223,28 @@ TEST(CoarseTracker, APoseThatHalfOfThePixelsDenyIsNotAsExpected) {
   EXPECT_TRUE(track({30.0, 1.0}).as_expected);
 }
 
+// When images become blurred, right poses fit many times worse than the last one, and a wider
+// search each time is for nothing.
+TEST(CoarseTracker, APoseThatCorrelatesIsAsExpectedWhateverTheLastResidualsWere) {
+  const SyntheticScene scene(3);
+  const TrackingReference reference = scene_reference(scene);
+  const SE3 truth(SO3::exp(Vec3(0.01, -0.02, 0.01)), Vec3(0.02, -0.01, 0.03));
+  const ImagePyramidPtr image = scene_view(scene, small_camera(), truth.inverse());
+  const std::vector<SE3> start = {SE3()};
+  TrackerConfig config;
+  const auto track = [&](const LastTracking& last) {
+    return CoarseTracker(config).track(reference, *image, 0.0, {}, start, last);
+  };
+  const TrackingResult right = track({0.01, 1.0});
+  ASSERT_TRUE(right.good);
+  ASSERT_GT(right.rmse, config.lost_rmse_factor * 0.01);
+  EXPECT_GT(right.correlation, config.sure_correlation);
+  EXPECT_TRUE(right.as_expected);
+  config.sure_correlation = 1.0;
+  EXPECT_FALSE(track({0.01, 1.0}).as_expected);
+  EXPECT_TRUE(track({right.rmse, 1.0}).as_expected) << "by its residuals";
+}
+
 // Where a scene hides much of itself in every frame, a wider search each time is for nothing.
 TEST(CoarseTracker, AsManyInliersAsInTheLastFrameAreAsExpected) {
   const SyntheticScene scene(3);

@@ -85,6 +85,30 @@ std::string table_row(const SyntheticCase& which, const std::vector<SyntheticRes
   return text + "\n";
 }
 
+/// The mean of the cases' medians, which is the benchmark's word on what differs from flight to
+/// flight.
+std::string mean_row(const std::vector<std::vector<SyntheticResult>>& cases) {
+  double length = 0.0;
+  std::size_t frames = 0;
+  for (const auto& runs : cases) {
+    length += runs[0].length_m;
+    frames += runs[0].frames;
+  }
+  std::string text = name_cell("all, mean") + padded(format_fixed(length, 0), 6) +
+                     padded(std::to_string(frames), 8);
+  for (const Column& column : columns()) {
+    double sum = 0.0;
+    for (const auto& runs : cases) {
+      std::vector<double> values;
+      for (const SyntheticResult& run : runs) values.push_back(column.scale * run.*column.value);
+      sum += quantile(values, 0.5);
+    }
+    const double mean = sum / static_cast<double>(cases.size());
+    text += padded(format_fixed(mean, column.digits), 12 + (cases[0].size() > 1 ? 4 : 0));
+  }
+  return text + "\n";
+}
+
 nlohmann::ordered_json case_to_json(const SyntheticCase& which, std::uint64_t seed,
                                     const SyntheticResult& run) {
   nlohmann::ordered_json json;
@@ -142,18 +166,20 @@ int bench_synthetic(const AppConfig& config, const BenchArguments& arguments) {
             << (arguments.runs > 1 ? "; medians, worst in brackets\n" : "\n") << table_head()
             << std::flush;
   nlohmann::ordered_json json = nlohmann::ordered_json::array();
-  bool complete = true;
+  std::vector<std::vector<SyntheticResult>> flown;
   for (const SyntheticCase& which : cases) {
     const auto runs = run_case(config, which, arguments, stop, &json);
     if (stop.requested()) return fail(kFailed, "stopped by the user");
-    complete = complete && !runs.empty();
-    if (!runs.empty()) std::cout << table_row(which, runs) << std::flush;
+    if (runs.empty()) continue;
+    std::cout << table_row(which, runs) << std::flush;
+    flown.push_back(runs);
   }
+  if (flown.size() > 1) std::cout << mean_row(flown);
   if (!arguments.json.empty()) {
     const auto written = write_text_file(arguments.json, json.dump(2) + "\n");
     if (!written) return fail(kFailed, written.error());
   }
-  return complete ? kOk : kFailed;
+  return flown.size() == cases.size() ? kOk : kFailed;
 }
 
 }  // namespace

@@ -163,8 +163,12 @@ class SyntheticBench(SimTest):
         lines = result.stdout.splitlines()
         self.assertIn("ynthetic", lines[0])
         self.assertEqual([line.split()[0] for line in lines[1:]],
-                         ["world/trajectory", "lawn/square", "lawn/square"])
+                         ["world/trajectory", "lawn/square", "lawn/square", "all,"])
         runs = json.loads(numbers.read_text())
+        # Of two runs the median is the mean.
+        mean_ate = sum(run["ate_m"] for run in runs) / 4
+        self.assertEqual(lines[-1].split()[3], str(2 * FRAMES))
+        self.assertAlmostEqual(float(lines[-1].split()[7]), mean_ate, delta=1e-4)
         self.assertEqual([(r["case"], r["seed"]) for r in runs],
                          [("lawn/square", 1), ("lawn/square", 2),
                           ("lawn/square <", 1), ("lawn/square <", 2)])

@@ -15,7 +15,7 @@ struct TrackerConfig {
   double sure_inlier_ratio = 0.8;
   /// Or, whatever the last RMSE was, when with that share of inliers reference and image correlate
   /// more than this. Of wrong poses under blows, after gaps and in races none had more than 0.71.
-  double sure_correlation = 0.85;
+  double sure_correlation = 0.9;
   double max_rmse = 40.0;         ///< Lost above [grey levels].
   double min_inlier_ratio = 0.5;  ///< Lost below: reference pixels in view that agree.
   /// Lost below: correlation of reference and image. Right poses have 0.6 and more, on real clips

@@ -68,13 +68,20 @@ std::string table_head() {
   return text + "\n";
 }
 
+/// What a column shows of each run.
+std::vector<double> shown(const Column& column, const std::vector<SyntheticResult>& runs) {
+  std::vector<double> values;
+  values.reserve(runs.size());
+  for (const SyntheticResult& run : runs) values.push_back(column.scale * run.*column.value);
+  return values;
+}
+
 /// The median of each column over the runs; with several runs the worst in brackets.
 std::string table_row(const SyntheticCase& which, const std::vector<SyntheticResult>& runs) {
   std::string text = name_cell(name_of(which)) + padded(format_fixed(runs[0].length_m, 0), 6) +
                      padded(std::to_string(runs[0].frames), 8);
   for (const Column& column : columns()) {
-    std::vector<double> values;
-    for (const SyntheticResult& run : runs) values.push_back(column.scale * run.*column.value);
+    const std::vector<double> values = shown(column, runs);
     std::string cell = format_fixed(quantile(values, 0.5), column.digits);
     if (runs.size() > 1) {
       const auto [least, most] = std::minmax_element(values.begin(), values.end());
@@ -98,11 +105,7 @@ std::string mean_row(const std::vector<std::vector<SyntheticResult>>& cases) {
                      padded(std::to_string(frames), 8);
   for (const Column& column : columns()) {
     double sum = 0.0;
-    for (const auto& runs : cases) {
-      std::vector<double> values;
-      for (const SyntheticResult& run : runs) values.push_back(column.scale * run.*column.value);
-      sum += quantile(values, 0.5);
-    }
+    for (const auto& runs : cases) sum += quantile(shown(column, runs), 0.5);
     const double mean = sum / static_cast<double>(cases.size());
     text += padded(format_fixed(mean, column.digits), 12 + (cases[0].size() > 1 ? 4 : 0));
   }

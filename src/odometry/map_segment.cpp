@@ -62,7 +62,8 @@ DepthProposal proposal_of(const StaticMatch& match) {
   return {match.inverse_depth, match.sigma};
 }
 
-/// Halving averages the noise of four pixels, so that half the contrast is enough.
+/// Halving averages the noise of four pixels, so that half the contrast is enough. A quarter is
+/// not, in images halved twice: grey levels are whole numbers, and those maps broke at once.
 DirectConfig for_halved(DirectConfig config, int halvings) {
   config.selection.least_offset /= 1 << std::min(halvings, 1);
   return config;

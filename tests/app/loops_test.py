@@ -49,8 +49,8 @@ class LoopTest(CommandTest):
 
 class Loops(LoopTest):
     def test_a_second_lap_takes_the_drift_away_and_leaves_the_odometry_alone(self):
-        # With few points it drifts enough to tell.
-        few = ("vo.points.active_points=150", "vo.points.immature_points=60")
+        # With few points it drifts enough to tell: 9 mm, by the loops 4.
+        few = ("vo.points.active_points=150", "vo.points.immature_points=60", "seed=1")
         self.fly(laps, 2 * LAP_S, settings=few, stem="without")
         without = self.out.read_bytes()
         result = self.fly(laps, 2 * LAP_S, "--loops", "--out-map", self.folder / "map.txt",
@@ -59,7 +59,7 @@ class Loops(LoopTest):
         self.assertEqual(self.out.read_bytes(), without)
         self.assertEqual([p[0] for p in read_tum(self.folder / "map.txt")],
                          [p[0] for p in read_tum(self.out)])
-        self.assertLess(self.error(self.folder / "map.txt"), 0.8 * self.error(self.out))
+        self.assertLess(self.error(self.folder / "map.txt"), 0.7 * self.error(self.out))
         again = self.folder / "again.txt"
         self.fly(laps, 2 * LAP_S, "--loops", "--out-map", again, settings=few, stem="again")
         self.assertEqual(again.read_bytes(), (self.folder / "map.txt").read_bytes())

@@ -121,6 +121,29 @@ TEST(MotionTest, FilesOfOtherConventionsAreBroughtIntoTheWorld) {
   EXPECT_NEAR((r * Vec3::UnitZ()).x(), 1.0, 1e-6);
 }
 
+/// Bad positions of a vehicle that stands still, as GPS gives them, do not dive through the road.
+TEST(MotionTest, StaysAboveLevelGround) {
+  const std::string file = (std::filesystem::path(::testing::TempDir()) / "dive.txt").string();
+  Trajectory drive;
+  for (int i = 0; i < 100; ++i) {
+    const double dive = 4.0 * std::exp(-0.01 * (i - 50) * (i - 50));
+    drive.push_back({i * 100'000'000LL, SE3(SO3(), Vec3(0.0, dive, 0.2 * i))});
+  }
+  ASSERT_TRUE(write_kitti_poses(file, drive));
+  SimConfig config;
+  config.trajectory = file;
+  for (const World world : {World::kStreet, World::kLawn}) {
+    config.world = world;
+    const auto motion = load_motion(config, own_rig(world));
+    ASSERT_TRUE(motion) << motion.error();
+    double lowest = 10.0;
+    for (const StampedPose& p : motion->samples()) {
+      lowest = std::min(lowest, p.T_world_body.translation().z());
+    }
+    EXPECT_NEAR(lowest, 0.35, 1e-9);
+  }
+}
+
 TEST(MotionBlurTest, TurnSmearsAcrossAndRestLeavesAlone) {
   const CameraModel camera = test::make_camera(64, 48, 100.0, 100.0, 31.5, 23.5);
   const RayTable rays(camera);

@@ -104,13 +104,24 @@ void level(Trajectory* poses, double height) {
   }
 }
 
+double lowest(const Trajectory& poses) {
+  double z = std::numeric_limits<double>::infinity();
+  for (const StampedPose& p : poses) z = std::min(z, p.T_world_body.translation().z());
+  return z;
+}
+
 /// Lifts the trajectory so that its lowest point is at `height`.
 void lift(Trajectory* poses, double height) {
-  double lowest = std::numeric_limits<double>::infinity();
-  for (const StampedPose& p : *poses) {
-    lowest = std::min(lowest, p.T_world_body.translation().z());
-  }
-  for (StampedPose& p : *poses) p.T_world_body.translation().z() += height - lowest;
+  const double by = height - lowest(*poses);
+  for (StampedPose& p : *poses) p.T_world_body.translation().z() += by;
+}
+
+/// Ground is level and seen from above: a trajectory that changes its height faster than `level`
+/// takes for slow would dive below it.
+void level_above_ground(Trajectory* poses, double height) {
+  constexpr double kLeast = 0.35;  // [m]
+  level(poses, height);
+  if (lowest(*poses) < kLeast) lift(poses, kLeast);
 }
 
 }  // namespace
@@ -134,10 +145,10 @@ Result<Motion> load_motion(const SimConfig& config, const StereoRig& rig) {
   }
   switch (config.world) {
     case World::kStreet:
-      level(&*poses, 1.65);
+      level_above_ground(&*poses, 1.65);
       break;
     case World::kLawn:
-      level(&*poses, 1.45);
+      level_above_ground(&*poses, 1.45);
       break;
     case World::kPool:
       lift(&*poses, 0.9);

@@ -145,9 +145,10 @@ double least_correlation(const TrackerConfig& config, const LastTracking& last,
 /// Sums of pairs of values.
 struct Moments {
   double n = 0.0, x = 0.0, y = 0.0, xx = 0.0, yy = 0.0, xy = 0.0;
+  double squared_gradient = 0.0;  ///< Of y.
 
-  /// Pairs that are left out are zero in all three.
-  void add(float one, float a, float b) {
+  /// Pairs that are left out are zero in all four.
+  void add(float one, float a, float b, float squared) {
     const double da = a;
     const double db = b;
     n += one;
@@ -156,6 +157,7 @@ struct Moments {
     xx += da * da;
     yy += db * db;
     xy += da * db;
+    squared_gradient += squared;
   }
 
   /// Pearson's; 0 where either does not vary.
@@ -163,6 +165,11 @@ struct Moments {
     const double var_x = n * xx - x * x;
     const double var_y = n * yy - y * y;
     return var_x > 0.0 && var_y > 0.0 ? (n * xy - x * y) / std::sqrt(var_x * var_y) : 0.0;
+  }
+
+  double sharpness() const {
+    const double var_y = n * yy - y * y;
+    return var_y > 0.0 ? n * squared_gradient / var_y : 0.0;
   }
 };
 
@@ -199,8 +206,9 @@ double CoarseTracker::residuals(const ReferenceLevel& level, const ImageF& image
   return out->energy;
 }
 
-double CoarseTracker::correlation(const ReferenceLevel& level, const ImageF& image, const SE3& T) {
-  const TrackedPoints points{level, image, Warp(level.camera, T)};
+void CoarseTracker::compare(const ReferenceLevel& level, const ImageF& image,
+                            TrackingResult* result) {
+  const TrackedPoints points{level, image, Warp(level.camera, result->T_current_reference)};
   const Lane zero = lane_of(0.0F);
   Moments moments;
   for (std::size_t i = 0; i < level.size(); i += kLanes) {
@@ -210,9 +218,11 @@ double CoarseTracker::correlation(const ReferenceLevel& level, const ImageF& ima
     const Lane x = p.in_view ? p.colour : zero;
     const Lane y = p.in_view ? s.value : zero;
     const Lane one = p.in_view ? lane_of(1.0F) : zero;
-    for (std::size_t k = 0; k < kLanes; ++k) moments.add(one[k], x[k], y[k]);
+    const Lane g = p.in_view ? Lane(s.gx * s.gx + s.gy * s.gy) : zero;
+    for (std::size_t k = 0; k < kLanes; ++k) moments.add(one[k], x[k], y[k], g[k]);
   }
-  return moments.correlation();
+  result->correlation = moments.correlation();
+  result->sharpness = moments.sharpness();
 }
 
 void CoarseTracker::normal_equations(const BrightnessTransfer& transfer, double reference_b,
@@ -348,7 +358,7 @@ TrackingResult CoarseTracker::track(const TrackingReference& reference, const Im
     tried.hypothesis = static_cast<int>(i);
     if (!tried.good || (best.good && tried.rmse >= best.rmse)) continue;
     best = tried;
-    best.correlation = correlation(reference.levels[0], pyramid.level(0), best.T_current_reference);
+    compare(reference.levels[0], pyramid.level(0), &best);
     best.as_expected = is_as_expected(config_, last, best);
     if (best.as_expected) break;
   }

@@ -23,6 +23,9 @@ struct TrackingResult {
   double inlier_ratio = 0.0;  ///< Reference pixels in view that are not saturated.
   double view_ratio = 0.0;    ///< Reference pixels that are in view.
   double correlation = 0.0;   ///< Of the brightness of reference pixels in view and image, -1..1.
+  /// How sharp the image is at the reference pixels: mean squared gradient over the variance of the
+  /// brightness there [1/px^2]. Gain and bias leave it alone, blur takes it away.
+  double sharpness = 0.0;
   int inliers = 0;
   Mat6 information = Mat6::Zero();  ///< Of T_current_reference (left perturbation), unit noise.
   int hypothesis = 0;               ///< Which motion hypothesis was taken.
@@ -76,7 +79,8 @@ class CoarseTracker {
   };
   double residuals(const ReferenceLevel& level, const ImageF& image, const SE3& T,
                    const BrightnessTransfer& transfer, double cutoff, Linearization* out);
-  static double correlation(const ReferenceLevel& level, const ImageF& image, const SE3& T);
+  /// Correlation and sharpness of the result's pose.
+  static void compare(const ReferenceLevel& level, const ImageF& image, TrackingResult* result);
   void normal_equations(const BrightnessTransfer& transfer, double reference_b, Linearization* out);
   LevelOutcome align_level(const TrackingReference& reference, int level, const ImageF& image,
                            double exposure_s, double* cutoff, SE3* T, Affine* affine,

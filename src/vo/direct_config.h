@@ -50,7 +50,7 @@ struct TrackerConfig {
 
 /// When a frame becomes a keyframe: the weighted sum of the flow since the newest one (in units of
 /// 1120 / (width + height)) and the brightness change exceeds 1, or a smaller sum and a residual
-/// twice the first one's.
+/// twice the first one's. A frame that is blurred waits for a sharp one while there is time.
 struct KeyframeConfig {
   double flow_translation = 0.006;
   double flow_total = 0.012;
@@ -59,6 +59,8 @@ struct KeyframeConfig {
   double brightness = 2.0;
   double rmse_factor = 2.0;
   double rmse_min_score = 0.13;
+  double blurred_sharpness = 0.7;
+  double blurred_max_score = 1.3;
   int max_keyframes = 7;          ///< In the window, the newest included.
   int min_keyframes = 5;          ///< Kept although few of their points remain.
   double min_points_left = 0.05;  ///< A keyframe with a smaller share of its points leaves.
@@ -74,6 +76,10 @@ struct KeyframeConfig {
     v("brightness", brightness, "weight of the change of log-gain");
     v("rmse_factor", rmse_factor, "a keyframe is made above this x the first residual");
     v("rmse_min_score", rmse_min_score, "weighted sum below which no residual makes a keyframe");
+    v("blurred_sharpness", blurred_sharpness,
+      "a frame is blurred below this share of the sharpest lately; 0: never");
+    v("blurred_max_score", blurred_max_score,
+      "a blurred frame is no keyframe while the next one's motion will weigh less than this");
     v("max_keyframes", max_keyframes, "keyframes in the window, 3 to 8");
     v("min_keyframes", min_keyframes, "kept although few of their points remain");
     v("min_points_left", min_points_left, "share of points below which a keyframe leaves");

@@ -130,6 +130,7 @@ void DirectOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
   gradient_scatter_ = 1.0;
   past_.clear();
   has_first_rmse_ = false;
+  sharpest_ = 0.0;
   last_affine_ = {};
   last_tracking_ = {};
   lasting_share_ = 1.0;

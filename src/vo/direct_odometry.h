@@ -13,6 +13,7 @@
 #include "sovo/vo/bundle_adjustment.h"
 #include "sovo/vo/coarse_tracker.h"
 #include "sovo/vo/direct_config.h"
+#include "sovo/vo/keyframe_policy.h"
 #include "sovo/vo/keyframe_poses.h"
 #include "sovo/vo/monocular_odometry.h"
 #include "sovo/vo/pixel_selector.h"
@@ -172,6 +173,9 @@ class DirectOdometry {
   /// From the likely motions, and when none fits as expected, from those of a camera that was
   /// knocked.
   TrackingResult align(const TrackingReference& reference, const MonoFrame& frame);
+  /// Compares a tracked frame with those before it, and notes what the next one is compared with.
+  TrackedHistory compare_with_past(const TrackingReference& reference, const MonoFrame& frame,
+                                   const TrackingResult& tracked);
 
   DirectConfig config_;
   CameraModel camera_;
@@ -219,6 +223,7 @@ class DirectOdometry {
   double first_rmse_ = 0.0;
   std::uint32_t first_rmse_keyframe_ = 0;
   bool has_first_rmse_ = false;
+  double sharpest_ = 0.0;  ///< `TrackingResult::sharpness` of the sharpest frame lately.
 };
 
 }  // namespace sovo

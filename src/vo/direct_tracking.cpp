@@ -186,21 +186,35 @@ TrackedFrame DirectOdometry::track_from(const MonoFrame& frame, const SE3& T_cur
   return track_hypotheses(frame, reference());
 }
 
+TrackedHistory DirectOdometry::compare_with_past(const TrackingReference& reference,
+                                                 const MonoFrame& frame,
+                                                 const TrackingResult& tracked) {
+  constexpr double kForget = 0.9;  // a frame: a scene of weaker texture is soon the measure
+  if (!has_first_rmse_ || first_rmse_keyframe_ != reference.keyframe_id) {
+    first_rmse_ = tracked.rmse;
+    first_rmse_keyframe_ = reference.keyframe_id;
+    has_first_rmse_ = true;
+  }
+  sharpest_ = std::max(kForget * sharpest_, tracked.sharpness);
+  TrackedHistory out{.first_rmse = first_rmse_};
+  out.blurred = tracked.sharpness < config_.keyframe.blurred_sharpness * sharpest_;
+  if (!past_.empty()) {
+    const double since_last = seconds_between(past_.back().stamp_ns, frame.stamp_ns);
+    out.frames = std::max(1.0, seconds_between(reference.stamp_ns, frame.stamp_ns) / since_last);
+  }
+  return out;
+}
+
 TrackedFrame DirectOdometry::track_hypotheses(const MonoFrame& frame,
                                               std::shared_ptr<const TrackingReference> reference) {
   TrackedFrame out;
   out.frame = frame;
   out.reference = std::move(reference);
   const TrackingReference& ref = *out.reference;
-  const bool same_reference = has_first_rmse_ && first_rmse_keyframe_ == ref.keyframe_id;
   out.tracking = align(ref, frame);
   if (!out.tracking.good) return out;
 
-  if (!same_reference) {
-    first_rmse_ = out.tracking.rmse;
-    first_rmse_keyframe_ = ref.keyframe_id;
-    has_first_rmse_ = true;
-  }
+  const TrackedHistory history = compare_with_past(ref, frame, out.tracking);
   last_tracking_ = {out.tracking.rmse, out.tracking.inlier_ratio};
   last_affine_ = out.tracking.affine;
   out.T_world_camera = ref.T_world_camera * out.tracking.T_current_reference.inverse();
@@ -208,7 +222,7 @@ TrackedFrame DirectOdometry::track_hypotheses(const MonoFrame& frame,
       motion_of_points(ref, out.tracking.T_current_reference,
                        config_.keyframe.max_translation_flow * pixels_for_one_of_vga(camera_));
   out.wants_keyframe = wants_keyframe(config_.keyframe, camera_, ref, out.tracking, motion,
-                                      frame.exposure_s, first_rmse_);
+                                      frame.exposure_s, history);
   past_.push_back(
       {out.tracking.T_current_reference, ref.log_scale, ref.keyframe_id, frame.stamp_ns});
   if (past_.size() > 2) past_.erase(past_.begin());

@@ -40,18 +40,22 @@ double pixels_for_one_of_vga(const CameraModel& camera) {
 
 bool wants_keyframe(const KeyframeConfig& config, const CameraModel& camera,
                     const TrackingReference& reference, const TrackingResult& tracked,
-                    const PointMotion& motion, double exposure_s, double first_rmse) {
+                    const PointMotion& motion, double exposure_s, const TrackedHistory& history) {
   const double unit = 1.0 / pixels_for_one_of_vga(camera);
   const BrightnessTransfer transfer =
       brightness_transfer(reference.affine, reference.exposure_s, tracked.affine, exposure_s);
-  const double score = config.flow_translation * unit * motion.flow_translation +
-                       config.flow_total * unit * motion.flow_total +
-                       config.approach * motion.approach +
-                       config.brightness * std::abs(std::log(transfer.gain));
+  const double motion_score = config.flow_translation * unit * motion.flow_translation +
+                              config.flow_total * unit * motion.flow_total +
+                              config.approach * motion.approach;
+  // All that is tracked against a blurred keyframe suffers, so a sharp one is waited for while the
+  // next frame will still be near. Blur takes contrast, which says nothing of the light.
+  const double next_score = motion_score * (1.0 + 1.0 / history.frames);
+  if (history.blurred && next_score < config.blurred_max_score) return false;
+  const double score = motion_score + config.brightness * std::abs(std::log(transfer.gain));
   // The residual of a camera at rest is noise, and twice of it nothing that a keyframe would mend:
   // without parallax the window's scale would be left to that noise.
   const bool fits_badly =
-      tracked.rmse > config.rmse_factor * first_rmse && score > config.rmse_min_score;
+      tracked.rmse > config.rmse_factor * history.first_rmse && score > config.rmse_min_score;
   return score > 1.0 || fits_badly;
 }
 

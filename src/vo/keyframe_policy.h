@@ -13,12 +13,18 @@ namespace sovo {
 /// Pixels of `camera` for one of a VGA image, in which the flows of `KeyframeConfig` are given.
 double pixels_for_one_of_vga(const CameraModel& camera);
 
+/// How a frame that was tracked compares with those before it.
+struct TrackedHistory {
+  double first_rmse = 0.0;  ///< Of the first frame tracked against this reference.
+  bool blurred = false;     ///< Those shortly before were sharper.
+  double frames = 1.0;      ///< Time since the reference over that since the last frame.
+};
+
 /// Whether a tracked frame should become a keyframe. `motion`: of the reference's points, flows
-/// clipped at `config.max_translation_flow`. `first_rmse`: of the first frame tracked against this
-/// reference.
+/// clipped at `config.max_translation_flow`.
 bool wants_keyframe(const KeyframeConfig& config, const CameraModel& camera,
                     const TrackingReference& reference, const TrackingResult& tracked,
-                    const PointMotion& motion, double exposure_s, double first_rmse);
+                    const PointMotion& motion, double exposure_s, const TrackedHistory& history);
 
 /// Marks the keyframes that are to leave the window when a new one enters: those with few points
 /// left or another brightness, then the one that keeps the others best distributed (DSO, Sec. 3.1,

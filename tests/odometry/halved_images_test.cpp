@@ -14,31 +14,6 @@ using namespace test;
 
 constexpr double kBlurredError = 0.04;  // of a way of 1.3 m, seen in 120x90 blurred pixels
 
-/// As a lens out of focus shows it: the mean of (2 r + 1)^2 pixels, twice.
-SideImage blurred(const SideImage& side, int r) {
-  SideImage out = side;
-  auto pixels = std::make_shared<std::vector<std::uint8_t>>(*side.data);
-  for (int pass = 0; pass < 2; ++pass) {
-    const std::vector<std::uint8_t> from = *pixels;
-    for (int y = 0; y < side.height; ++y) {
-      for (int x = 0; x < side.width; ++x) {
-        int sum = 0;
-        int count = 0;
-        for (int j = std::max(y - r, 0); j <= std::min(y + r, side.height - 1); ++j) {
-          for (int i = std::max(x - r, 0); i <= std::min(x + r, side.width - 1); ++i) {
-            sum += from[static_cast<std::size_t>(j * side.step + i)];
-            ++count;
-          }
-        }
-        (*pixels)[static_cast<std::size_t>(y * side.step + x)] =
-            static_cast<std::uint8_t>((2 * sum + count) / (2 * count));
-      }
-    }
-  }
-  out.data = pixels;
-  return out;
-}
-
 StereoFrame blurred_frame(int i) {
   constexpr int kRadius = 4;
   StereoFrame frame = drive_frame(i);

@@ -411,6 +411,38 @@ TEST(StereoOdometry, OneUnrelatedFrameLosesNoMap) {
   expect_follows_the_drive(published(run.recorder), 0.015, 0.05);
 }
 
+/// Of a drive that jolts: every third frame is blurred.
+struct JoltedDrive {
+  int tracked = 0;
+  int keyframes = 0;
+  int blurred_keyframes = 0;
+
+  explicit JoltedDrive(const StereoOdometryConfig& config) {
+    Playback run(config);
+    for (int i = 0; i < 60; ++i) {
+      StereoFrame frame = drive_frame(i);
+      const bool jolt = i % 3 == 2;
+      if (jolt) frame.left = blurred(frame.left, 2);
+      if (jolt) frame.right = blurred(frame.right, 2);
+      const OdometryOutput out = run.give(frame);
+      tracked += out.pose_valid ? 1 : 0;
+      keyframes += out.is_keyframe ? 1 : 0;
+      blurred_keyframes += out.is_keyframe && jolt ? 1 : 0;
+    }
+  }
+};
+
+TEST(StereoOdometry, BlurredFramesMakeNoKeyframesWhereSharpOnesCome) {
+  StereoOdometryConfig config = test_config();
+  config.vo.keyframe.flow_translation = 0.015;  // a keyframe every five frames or so
+  const JoltedDrive drive(config);
+  EXPECT_EQ(drive.tracked, 60);
+  EXPECT_GE(drive.keyframes, 5);
+  EXPECT_EQ(drive.blurred_keyframes, 0);
+  config.vo.keyframe.blurred_sharpness = 0.0;
+  EXPECT_GT(JoltedDrive(config).blurred_keyframes, 0) << "the test needs another drive";
+}
+
 TEST(StereoOdometry, ResetBeginsAnew) {
   for (const bool deterministic : {true, false}) {
     StereoOdometryConfig config = test_config();

@@ -245,6 +245,35 @@ TEST(CoarseTracker, APoseThatCorrelatesIsAsExpectedWhateverTheLastResidualsWere)
   EXPECT_TRUE(track({right.rmse, 1.0}).as_expected) << "by its residuals";
 }
 
+// Whether a frame makes a good keyframe is judged by it.
+TEST(CoarseTracker, BlurTakesTheSharpnessAwayAndGainAndBiasDoNot) {
+  const SyntheticScene scene(3);
+  const TrackingReference reference = scene_reference(scene);
+  const ImageF sharp = scene_view(scene, small_camera(), SE3())->level(0);
+  ImageF darker = sharp;
+  for (std::size_t i = 0; i < darker.size(); ++i) darker.data()[i] = 20.0F + 0.6F * sharp.data()[i];
+  ImageF smeared = sharp;
+  for (int y = 0; y < sharp.height(); ++y) {
+    for (int x = 3; x + 3 < sharp.width(); ++x) {
+      float sum = 0.0F;
+      for (int k = -3; k <= 3; ++k) sum += sharp.at(x + k, y);
+      smeared.at(x, y) = sum / 7.0F;
+    }
+  }
+  const auto sharpness = [&](const ImageF& image) {
+    const std::vector<SE3> start = {SE3()};
+    const TrackingResult result =
+        CoarseTracker(TrackerConfig())
+            .track(reference, *pyramid_of(image), 0.0, {}, start, {30.0, 0.5});
+    EXPECT_TRUE(result.good);
+    return result.sharpness;
+  };
+  const double of_sharp = sharpness(sharp);
+  EXPECT_GT(of_sharp, 0.0);
+  EXPECT_NEAR(sharpness(darker), of_sharp, 0.02 * of_sharp);
+  EXPECT_LT(sharpness(smeared), KeyframeConfig().blurred_sharpness * of_sharp);
+}
+
 // Where a scene hides much of itself in every frame, a wider search each time is for nothing.
 TEST(CoarseTracker, AsManyInliersAsInTheLastFrameAreAsExpected) {
   const SyntheticScene scene(3);

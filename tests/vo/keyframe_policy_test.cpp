@@ -15,13 +15,13 @@ class KeyframeDecision : public ::testing::Test {
   }
 
   /// Flow of the whole image without rotation [px], residual over that of the first frame.
-  bool wanted(double flow_px, double rmse_ratio, double log_gain = 0.0,
-              double approach = 0.0) const {
+  bool wanted(double flow_px, double rmse_ratio, double log_gain = 0.0, double approach = 0.0,
+              bool blurred = false, double frames = 1.0) const {
     TrackingResult tracked;
     tracked.rmse = rmse_ratio;
     tracked.affine.a = log_gain;
     return wants_keyframe(KeyframeConfig(), camera_, TrackingReference(), tracked,
-                          {flow_px, flow_px, approach}, 0.0, 1.0);
+                          {flow_px, flow_px, approach}, 0.0, {1.0, blurred, frames});
   }
 
   CameraModel camera_;
@@ -48,6 +48,21 @@ TEST_F(KeyframeDecision, ABadFitMakesOneWhereThereIsParallax) {
 TEST_F(KeyframeDecision, ABadFitOfACameraAtRestDoesNot) {
   EXPECT_FALSE(wanted(0.2, 2.1));
   EXPECT_FALSE(wanted(0.0, 10.0));
+}
+
+TEST_F(KeyframeDecision, ABlurredFrameWaitsForASharpOneWhileThereIsTime) {
+  const auto blurred = [this](double flow_px, double rmse_ratio, double frames) {
+    return wanted(flow_px, rmse_ratio, 0.0, 0.0, true, frames);
+  };
+  ASSERT_TRUE(wanted(57.0, 1.0));
+  EXPECT_FALSE(blurred(57.0, 1.0, 5.0)) << "the next one moves a fifth more";
+  EXPECT_FALSE(blurred(60.0, 1.0, 5.0));
+  EXPECT_TRUE(blurred(61.0, 1.0, 5.0));
+  EXPECT_TRUE(blurred(57.0, 1.0, 1.0)) << "the next one will be twice as far";
+  ASSERT_TRUE(wanted(8.0, 2.1));
+  EXPECT_FALSE(blurred(8.0, 2.1, 5.0)) << "blur fits badly";
+  ASSERT_TRUE(wanted(20.0, 1.0, -0.51));
+  EXPECT_FALSE(wanted(20.0, 1.0, -0.51, 0.0, true, 5.0)) << "and takes contrast";
 }
 
 /// A window without images, whose points are a metre away.

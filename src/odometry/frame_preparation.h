@@ -10,7 +10,7 @@
 #include "sovo/image/stereo_frame.h"
 #include "sovo/image/undistorter.h"
 #include "sovo/odometry/stereo_odometry.h"
-#include "sovo/vo/direct_odometry.h"
+#include "sovo/vo/monocular_backend.h"
 
 namespace sovo {
 

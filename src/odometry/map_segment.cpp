@@ -6,6 +6,7 @@
 
 #include "sovo/image/halving.h"
 #include "sovo/odometry/trajectory_recorder.h"
+#include "sovo/vo/direct_odometry.h"
 
 namespace sovo {
 
@@ -106,8 +107,8 @@ MapSegment::MapSegment(const StereoOdometryConfig& config, const FramePreparatio
       halvings_(halvings),
       pool_(pool),
       observer_(observer),
-      vo_(for_halved(config.vo, halvings), rig().left, preparation.left_mask(halvings), config.seed,
-          pool),
+      vo_(std::make_unique<DirectOdometry>(for_halved(config.vo, halvings), rig().left,
+                                           preparation.left_mask(halvings), config.seed, pool)),
       matcher_(config.matcher, rig()),
       optimizer_(config.scale, rig()),
       filter_(config.filter),
@@ -137,7 +138,7 @@ bool MapSegment::wants_halving() const {
 
 bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage& right) {
   const std::vector<SelectedPixel> pixels =
-      vo_.select_pixels(frame, config_.vo.points.active_points);
+      vo_->select_pixels(frame, config_.vo.points.active_points);
   const auto right_pyramid =
       std::make_shared<const ImagePyramid>(preparation_.prepare_right(right, halvings_));
   const std::vector<StaticMatch> matches = match_all(*frame.pyramid, *right_pyramid, pixels);
@@ -164,8 +165,8 @@ bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage&
     reason_ = stereo_problem_;
     return false;
   }
-  if (stereo()) vo_.use_static_residuals(rig());
-  vo_.begin(frame, T_odom_left_start_, points, stereo() ? right_pyramid : nullptr);
+  if (stereo()) vo_->use_static_residuals(rig());
+  vo_->begin(frame, T_odom_left_start_, points, stereo() ? right_pyramid : nullptr);
   // Matching errors are independent; what remains is common to all (calibration).
   filter_.lock_initial(1.0 / std::sqrt(scale_information), frame.stamp_ns);
   publish_scale(nullptr, true);
@@ -173,7 +174,7 @@ bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage&
   stereo_problem_.clear();
   reason_.clear();
   MappingOutcome start;
-  start.map.active_points = vo_.window().num_active_points();
+  start.map.active_points = vo_->num_active_points();
   start.map.keyframes = 1;
   start.keyframes = {first_keyframe(frame, right_pyramid)};
   start_outcome_ = std::move(start);
@@ -217,8 +218,8 @@ bool MapSegment::finish_two_views(const MonoFrame& frame, const SideImage* right
     s.depth = {p.inverse_depth, std::max(p.sigma, 1e-3F * p.inverse_depth)};
     points.push_back(s);
   }
-  vo_.begin(*two_view_first_, T_odom_left_start_, points);
-  TrackedFrame second = vo_.track_from(frame, result.T_newest_first);
+  vo_->begin(*two_view_first_, T_odom_left_start_, points, nullptr);
+  TrackedFrame second = vo_->track_from(frame, result.T_newest_first);
   const MonoFrame first_frame = *std::exchange(two_view_first_, std::nullopt);
   two_view_initializer_.reset();
   if (!second.tracking.good) {
@@ -304,7 +305,7 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
     }
     if (stereo() && metric) keyframe_stereo.right = job.right;
   }
-  out.map = vo_.map(tracked, keyframe_stereo, timer);
+  out.map = vo_->map(tracked, keyframe_stereo, timer);
   broken_ = out.map.failed;
   if (!out.map.is_keyframe || out.map.failed) return out;
   assist_.on_keyframe(static_cast<double>(out.map.active_points) / config_.vo.points.active_points,
@@ -316,8 +317,8 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
   }
   out.keyframes = {new_keyframe(job.right)};
   revise_left(std::exchange(out.map.left, {}), &out.keyframes);
-  if (use_right && config_.mode != OdometryMode::kMono && vo_.snapshot()) {
-    job.snapshot = *vo_.snapshot();
+  if (use_right && config_.mode != OdometryMode::kMono && vo_->snapshot()) {
+    job.snapshot = *vo_->snapshot();
     job.cold_start = filter_.wants_cold_start();
     out.scale_job = std::move(job);
   }
@@ -335,7 +336,7 @@ ScaleEstimate MapSegment::estimate_scale(const ScaleJob& job) const {
 
 ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& estimate) {
   const bool was_locked = filter_.locked();
-  const double pending = vo_.log_scale() - job.snapshot.log_scale;
+  const double pending = vo_->log_scale() - job.snapshot.log_scale;
   ScaleMeasurement m;
   m.estimate = estimate;
   m.cold_start = job.cold_start;
@@ -365,9 +366,9 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
     correction.scale_epoch = job.snapshot.scale_epoch;
     correction.log_scale = pending + update.log_scale_correction;
     correction.first_lock = !was_locked;
-    record.correction = vo_.apply(correction);
+    record.correction = vo_->apply(correction);
     if (correction.first_lock) refined_until_ = 0;  // it rescales what was built before
-    if (stereo()) vo_.use_static_residuals(rig());
+    if (stereo()) vo_->use_static_residuals(rig());
   }
   if (was_locked) {
     extend_scale_path(position, sigma_before);
@@ -395,7 +396,7 @@ void MapSegment::extend_scale_path(const Vec3& position, double sigma) {
 void MapSegment::publish_scale(const ScaleRecord* record, bool accepted) {
   const std::lock_guard lock(status_mutex_);
   status_.locked = metric();
-  status_.log_scale = vo_.log_scale();
+  status_.log_scale = vo_->log_scale();
   status_.sigma = filter_.sigma();
   status_.path_covariance = scale_path_covariance_;
   status_.path_until = scale_path_until_;
@@ -416,9 +417,9 @@ ScaleStatus MapSegment::scale_status() const {
 
 KeyframeOutput MapSegment::first_keyframe(const MonoFrame& frame,
                                           const ImagePyramidPtr& right) const {
-  KeyframeOutput out = own_points(vo_.window_keyframes().front());
+  KeyframeOutput out = own_points(vo_->window_keyframes().front());
   out.scale_valid = metric();
-  out.T_odom_left = vo_.window().newest().T_world_camera();
+  out.T_odom_left = vo_->keyframes().back().T_world_camera;
   out.left = frame.pyramid;
   out.right = right;
   out.halvings = halvings_;
@@ -426,16 +427,16 @@ KeyframeOutput MapSegment::first_keyframe(const MonoFrame& frame,
 }
 
 KeyframeOutput MapSegment::new_keyframe(const ImagePyramidPtr& right) const {
-  const KeyframeSnapshot& s = *vo_.snapshot();
+  const KeyframeSnapshot& s = *vo_->snapshot();
   KeyframeOutput out;
   out.id = s.id;
   out.segment = index_;
   out.stamp_ns = s.stamp_ns;
   out.scale_valid = metric();
-  out.T_odom_left = vo_.window().newest().T_world_camera();
-  out.log_scale = vo_.log_scale();
+  out.T_odom_left = vo_->keyframes().back().T_world_camera;
+  out.log_scale = vo_->log_scale();
   set_points(s.points, s.pyramid->level(0), halvings_, &out);
-  out.covariance = vo_.reference()->covariance;
+  out.covariance = vo_->reference()->covariance;
   out.covariance.topLeftCorner<3, 3>() +=
       scale_status().position_covariance(out.T_odom_left.translation());
   out.left = s.pyramid;
@@ -460,7 +461,7 @@ void MapSegment::revise(const SE3& T_odom_left, KeyframeOutput* keyframe) const 
   keyframe->revised = true;
   keyframe->scale_valid = metric();
   keyframe->T_odom_left = T_odom_left;
-  keyframe->log_scale = vo_.keyframes()[keyframe->id].log_scale;
+  keyframe->log_scale = vo_->keyframes()[keyframe->id].log_scale;
   const auto scale = static_cast<float>(std::exp(-keyframe->log_scale));
   for (float& rho : keyframe->inverse_depth) rho *= scale;
   for (float& sigma : keyframe->sigma) sigma *= scale;
@@ -476,8 +477,8 @@ void MapSegment::revise_left(const std::vector<KeyframeState>& left,
     return;
   }
   if (waiting_.empty()) return;
-  refine_keyframe_poses(vo_.keyframes(), refined_until_, &refined_);
-  refined_until_ = vo_.window()[0].id;
+  refine_keyframe_poses(vo_->keyframes(), refined_until_, &refined_);
+  refined_until_ = vo_->oldest_in_window();
   for (KeyframeOutput& keyframe : waiting_) {
     revise(refined_[keyframe.id], &keyframe);
     out->push_back(std::move(keyframe));
@@ -489,9 +490,9 @@ std::vector<KeyframeOutput> MapSegment::remaining_keyframes() const {
   if (!initialized_) return {};
   std::vector<KeyframeOutput> out = waiting_;
   if (!broken_) {
-    for (const KeyframeState& state : vo_.window_keyframes()) out.push_back(own_points(state));
+    for (const KeyframeState& state : vo_->window_keyframes()) out.push_back(own_points(state));
   }
-  const std::vector<SE3> refined = refined_keyframe_poses(vo_.keyframes());
+  const std::vector<SE3> refined = refined_keyframe_poses(vo_->keyframes());
   for (KeyframeOutput& keyframe : out) revise(refined[keyframe.id], &keyframe);
   return out;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -8,8 +9,9 @@
 #include "sovo/odometry/frame_preparation.h"
 #include "sovo/odometry/odometry_output.h"
 #include "sovo/odometry/stereo_odometry.h"
-#include "sovo/vo/direct_odometry.h"
+#include "sovo/vo/monocular_backend.h"
 #include "sovo/vo/two_view_initializer.h"
+#include "sovo/vo/worker_pool.h"
 
 namespace sovo {
 
@@ -81,7 +83,7 @@ class MapSegment {
 
   /// Tracks a frame. The limit of acceleration counts once the map has metres.
   TrackedFrame track(const MonoFrame& frame) {
-    return vo_.track(frame, scale_status().locked ? config_.max_acceleration : 0.0);
+    return vo_->track(frame, scale_status().locked ? config_.max_acceleration : 0.0);
   }
 
   /// Maps a tracked frame. `right` may be null (missing): then there is no scale job.
@@ -98,7 +100,7 @@ class MapSegment {
   std::vector<KeyframeOutput> remaining_keyframes() const;
 
   ScaleStatus scale_status() const;
-  const DirectOdometry& vo() const { return vo_; }
+  const MonocularBackend& vo() const { return *vo_; }
   /// What the beginning has mapped by itself: the first keyframe, of two views also the second.
   /// It waits here once.
   std::optional<MappingOutcome> take_start_outcome();
@@ -131,7 +133,7 @@ class MapSegment {
   WorkerPool* pool_;
   StageObserver* observer_;
 
-  DirectOdometry vo_;
+  std::unique_ptr<MonocularBackend> vo_;
   StaticMatcher matcher_;
   ScaleOptimizer optimizer_;
   ScaleFilter filter_;

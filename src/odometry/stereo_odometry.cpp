@@ -149,7 +149,7 @@ class StereoOdometry::Impl {
     out->is_keyframe = true;
     out->keyframe_id = reference->keyframe_id;
     set_pose(first.T_world_camera, Mat6::Zero(), Mat6::Zero(), out);
-    out->state = state_of(*out, TrackingResult(), "");
+    out->state = state_of(*out, FrameTracking(), "");
   }
 
   void follow(const MonoFrame& left, const SideImage* right, const std::string& right_problem,
@@ -165,33 +165,25 @@ class StereoOdometry::Impl {
     }
     failures_ = 0;
     recorder_.add(tracked);
-    const TrackingResult& t = tracked.tracking;
+    const FrameTracking& t = tracked.tracking;
     out->is_keyframe = tracked.wants_keyframe;
     out->keyframe_id = tracked.reference->keyframe_id;
     out->inliers = static_cast<std::uint32_t>(t.inliers);
     out->residual = t.rmse;
-    set_pose(tracked.T_world_camera, covariance_of(tracked),
+    set_pose(tracked.T_world_camera, rotated(tracked.T_world_camera.rotation(), tracked.covariance),
              carried(tracked.reference->covariance, tracked.T_world_camera.translation()), out);
     map(std::move(tracked), right);
     out->state = state_of(*out, t, right_problem);
     out->reason = reason_of(*out, t, right_problem);
   }
 
-  /// Covariance of (translation, rotation) of the pose in odom axes, from this frame's alignment.
-  static Mat6 covariance_of(const TrackedFrame& tracked) {
-    const TrackingResult& t = tracked.tracking;
-    const double variance = frame_variance(t.rmse, tracked.reference->gradient_scatter);
-    const Mat6 information = t.information / variance + 1e-6 * Mat6::Identity();
-    return rotated(tracked.T_world_camera.rotation(), information.inverse());
-  }
-
-  std::string why_lost(const TrackingResult& tracking) const {
+  std::string why_lost(const FrameTracking& tracking) const {
     if (map_broke_down()) return "the map broke down";
     if (!tracking.out_of_reach) return "this frame does not fit the map";
     return "this frame fits the map only where max_acceleration does not let the camera be";
   }
 
-  void lose(const TrackingResult& tracking, OdometryOutput* out) {
+  void lose(const FrameTracking& tracking, OdometryOutput* out) {
     ++failures_;
     out->state = OdometryState::kLost;
     out->pose_valid = false;
@@ -290,7 +282,7 @@ class StereoOdometry::Impl {
     distance_ += step.translation().norm();
   }
 
-  OdometryState state_of(const OdometryOutput& out, const TrackingResult& t,
+  OdometryState state_of(const OdometryOutput& out, const FrameTracking& t,
                          const std::string& right_problem) const {
     const bool tracked = t.good;
     if (tracked && t.inlier_ratio < kDegradedInliers) return OdometryState::kDegraded;
@@ -307,7 +299,7 @@ class StereoOdometry::Impl {
            out.scale_verdict != ScaleVerdict::kAccepted;
   }
 
-  std::string reason_of(const OdometryOutput& out, const TrackingResult& t,
+  std::string reason_of(const OdometryOutput& out, const FrameTracking& t,
                         const std::string& right_problem) const {
     if (!right_problem.empty()) return right_problem + "; the scale is not measured";
     if (out.state == OdometryState::kDegraded) {

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "sovo/odometry/odometry_output.h"
-#include "sovo/vo/direct_odometry.h"
+#include "sovo/vo/monocular_backend.h"
 
 namespace sovo {
 

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <algorithm>
-#include <limits>
 #include <vector>
 
+#include "sovo/vo/bundle_result.h"
 #include "sovo/vo/direct_config.h"
 #include "sovo/vo/normal_equations.h"
 #include "sovo/vo/photometric_problem.h"
@@ -37,21 +37,6 @@ inline double frame_variance(double rmse, double gradient_scatter) {
   constexpr double kSharedReference = 3.0;
   return kSharedReference * std::max(gradient_scatter, kLeastScatter) * std::max(rmse * rmse, 1.0);
 }
-
-struct BundleResult {
-  double rmse = 0.0;  ///< Of the residuals, an outlier counting its threshold [grey levels].
-  int iterations = 0;
-  int points = 0;
-  int residuals = 0;
-  bool finite = true;  ///< False: the solve broke down; the window must be thrown away.
-  /// Covariance of the newest keyframe's pose as seen from the keyframe before it (left
-  /// perturbation of T_newest_before: translation [the window's unit], rotation [rad]), the
-  /// window's scale held. Of two keyframes or more.
-  Mat6 newest_covariance = Mat6::Zero();
-  /// Of a common factor of all depths, by the static residuals; infinite without any.
-  double scale_variance = std::numeric_limits<double>::infinity();
-  double gradient_scatter = 1.0;  ///< Of the residuals into the newest keyframe.
-};
 
 /// Photometric bundle adjustment over the sliding window by Levenberg-Marquardt: poses,
 /// brightnesses and inverse depths; the intrinsics stay.

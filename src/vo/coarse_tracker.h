@@ -12,21 +12,15 @@
 
 namespace sovo {
 
-/// How a frame was tracked.
-struct TrackingResult {
-  bool good = false;
-  bool as_expected = false;   ///< It fits as well as the last frame lets expect.
-  bool out_of_reach = false;  ///< Not good only since the camera cannot have come there.
-  SE3 T_current_reference;
-  Affine affine;              ///< Of the current frame.
-  double rmse = 0.0;          ///< Of the finest level, saturated residuals at the cutoff.
-  double inlier_ratio = 0.0;  ///< Reference pixels in view that are not saturated.
-  double view_ratio = 0.0;    ///< Reference pixels that are in view.
-  double correlation = 0.0;   ///< Of the brightness of reference pixels in view and image, -1..1.
+/// How a frame was aligned.
+struct TrackingResult : FrameTracking {
+  bool as_expected = false;  ///< It fits as well as the last frame lets expect.
+  Affine affine;             ///< Of the current frame.
+  double view_ratio = 0.0;   ///< Reference pixels that are in view.
+  double correlation = 0.0;  ///< Of the brightness of reference pixels in view and image, -1..1.
   /// How sharp the image is at the reference pixels: mean squared gradient over the variance of the
   /// brightness there [1/px^2]. Gain and bias leave it alone, blur takes it away.
   double sharpness = 0.0;
-  int inliers = 0;
   Mat6 information = Mat6::Zero();  ///< Of T_current_reference (left perturbation), unit noise.
   int hypothesis = 0;               ///< Which motion hypothesis was taken.
 };

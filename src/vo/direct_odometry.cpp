@@ -5,7 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include "sovo/geometry/pose_covariance.h"
 #include "sovo/vo/epipolar_search.h"
 #include "sovo/vo/keyframe_policy.h"
 #include "sovo/vo/marginalization.h"
@@ -111,7 +110,6 @@ DirectOdometry::DirectOdometry(const DirectConfig& config, const CameraModel& ca
       selector_(selector_config(config.selection, seed)),
       activator_(config.points, config.window, pool),
       adjuster_(config.window, pool),
-      epoch_log_scale_{0.0},
       tracker_(config.tracker) {}
 
 std::vector<SelectedPixel> DirectOdometry::select_pixels(const MonoFrame& frame, int wanted) {
@@ -123,12 +121,11 @@ std::vector<SelectedPixel> DirectOdometry::select_pixels(const MonoFrame& frame,
 void DirectOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
                            const std::vector<StartPoint>& points, const ImagePyramidPtr& right) {
   window_.clear();
-  keyframes_.clear();
+  history_.clear();
   marginalized_.clear();
   snapshot_.reset();
-  covariance_.setZero();
   gradient_scatter_ = 1.0;
-  past_.clear();
+  motion_.clear();
   has_first_rmse_ = false;
   sharpest_ = 0.0;
   last_affine_ = {};
@@ -155,22 +152,22 @@ void DirectOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
     if (k.right) p.static_state = ResidualState::kIn;
   }
   window_.update_geometry();
-  keyframes_.record(window_poses(), log_scale_);
+  history_.record(window_poses());
   publish_reference();
 }
 
 MapResult DirectOdometry::map(const TrackedFrame& tracked, const KeyframeStereo& stereo,
                               const MapTimer& timer) {
   // The pose hangs on its reference as that is known now.
-  const auto& reference = *tracked.reference;
+  const ReferenceKeyframe& reference = *tracked.reference;
   SE3 T_camera_reference = tracked.tracking.T_current_reference;
-  T_camera_reference.translation() *= std::exp(log_scale_ - reference.log_scale);
+  T_camera_reference.translation() *= std::exp(log_scale() - reference.log_scale);
   const SE3 T_world_camera =
-      keyframes_[reference.keyframe_id].T_world_camera * T_camera_reference.inverse();
+      keyframes()[reference.keyframe_id].T_world_camera * T_camera_reference.inverse();
   const bool stale = reference.keyframe_id != window_.newest().id;
   {
     const StageTimer t(timer, MapStage::kTracing);
-    trace_all(tracked.frame, T_world_camera, tracked.tracking.affine);
+    trace_all(tracked.frame, T_world_camera, tracked.affine);
   }
   if (tracked.wants_keyframe && !stale) {
     return make_keyframe(tracked, T_world_camera, stereo, timer);
@@ -204,8 +201,8 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
   MapResult result;
   result.is_keyframe = true;
   mark_leaving_keyframes(config_.keyframe, &window_);
-  Keyframe& k = window_.insert(new_keyframe(next_id_++, tracked.frame, T_world_camera,
-                                            tracked.tracking.affine, config_.window));
+  Keyframe& k = window_.insert(
+      new_keyframe(next_id_++, tracked.frame, T_world_camera, tracked.affine, config_.window));
   for (int h = 0; h + 1 < window_.size(); ++h) {
     for (Point& p : window_[h].points) {
       p.residuals[static_cast<std::size_t>(k.slot)].state = ResidualState::kIn;
@@ -222,7 +219,7 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
       !result.bundle.finite || result.bundle.rmse > kMaxBundleRmse || result.bundle.residuals < 100;
   if (result.failed) return result;
 
-  extend_covariance(result.bundle.newest_covariance);
+  history_.extend_covariance(k.T_world_camera(), result.bundle.newest_covariance);
   gradient_scatter_ = result.bundle.gradient_scatter;
   for (int h = 0; h < window_.size(); ++h) {
     for (Point& p : window_[h].points) {
@@ -235,7 +232,7 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
   result.left = marginalize(timer);
   add_immature_points(stereo.depths, timer);
   set_right_image(stereo.right, &window_.newest());
-  keyframes_.record(window_poses(), log_scale_);
+  history_.record(window_poses());
   result.active_points = window_.num_active_points();
   result.keyframes = window_.size();
   return result;
@@ -243,7 +240,7 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
 
 std::vector<KeyframeState> DirectOdometry::marginalize(const MapTimer& timer) {
   const StageTimer t(timer, MapStage::kMarginalization);
-  keyframes_.record(window_poses(), log_scale_);  // of those that leave now
+  history_.record(window_poses());  // of those that leave now
   const LeavingPoints leaving = mark_leaving_points(config_.window, &window_);
   const double rho_unit = window_.mean_inverse_depth();
   for (const PointRef& ref : leaving.marginalize) {
@@ -266,7 +263,7 @@ std::vector<KeyframeState> DirectOdometry::marginalize(const MapTimer& timer) {
 void DirectOdometry::keep_point(const Point& point, double rho_unit, KeyframePoints* points) const {
   const double sigma = known_sigma(point, rho_unit);
   if (sigma <= 0.0) return;
-  const double to_first_unit = std::exp(log_scale_);
+  const double to_first_unit = std::exp(log_scale());
   points->u.push_back(point.u);
   points->v.push_back(point.v);
   points->inverse_depth.push_back(static_cast<float>(point.rho * to_first_unit));
@@ -341,30 +338,16 @@ std::vector<WindowPose> DirectOdometry::window_poses() const {
   return poses;
 }
 
-/// From the keyframe before to the newest: the errors of steps are taken as independent.
-void DirectOdometry::extend_covariance(const Mat6& newest_covariance) {
-  const SE3 newest = window_.newest().T_world_camera();
-  covariance_ += carried(rotated(newest.rotation(), newest_covariance), -newest.translation());
-}
-
-/// When the unit of the whole map changes. Later corrections are errors, which its sigma counts.
-void DirectOdometry::rescale_covariance(double scale, const Vec3& centre) {
-  covariance_ = carried(covariance_, centre);
-  covariance_.topRows<3>() *= scale;
-  covariance_.leftCols<3>() *= scale;
-  covariance_ = carried(covariance_, -centre);
-}
-
 void DirectOdometry::publish_reference() {
   auto next = std::make_shared<TrackingReference>(build_tracking_reference(window_, num_levels_));
-  next->log_scale = log_scale_;
-  next->covariance = covariance_;
+  next->log_scale = log_scale();
+  next->covariance = history_.covariance();
   next->gradient_scatter = gradient_scatter_;
   const std::lock_guard lock(reference_mutex_);
   reference_ = std::move(next);
 }
 
-std::shared_ptr<const TrackingReference> DirectOdometry::reference() const {
+std::shared_ptr<const TrackingReference> DirectOdometry::tracking_reference() const {
   const std::lock_guard lock(reference_mutex_);
   return reference_;
 }
@@ -375,8 +358,8 @@ void DirectOdometry::take_snapshot() {
   KeyframeSnapshot s;
   s.id = newest.id;
   s.stamp_ns = newest.stamp_ns;
-  s.scale_epoch = scale_epoch_;
-  s.log_scale = log_scale_;
+  s.scale_epoch = history_.scale_epoch();
+  s.log_scale = log_scale();
   s.T_world_camera = newest.T_world_camera();
   s.camera = camera_;
   s.pyramid = newest.pyramid;
@@ -405,22 +388,12 @@ void DirectOdometry::take_snapshot() {
 }
 
 double DirectOdometry::apply(const ScaleCorrection& correction) {
-  const double since = log_scale_ - epoch_log_scale_[correction.scale_epoch];
-  const double log_scale = correction.log_scale - since;
+  const double log_scale = history_.still_to_apply(correction);
   const double scale = std::exp(log_scale);
-  const Vec3 centre = window_.newest().T_world_camera().translation();
   window_.apply_similarity(scale);
-  log_scale_ += log_scale;
-  if (correction.first_lock) {
-    keyframes_.rescale_all(window_poses(), scale, centre, log_scale_);
-    rescale_covariance(scale, centre);
-  } else {
-    keyframes_.rescale(window_poses(), scale, log_scale_);
-  }
-  ++scale_epoch_;
-  epoch_log_scale_.push_back(log_scale_);
-  auto next = std::make_shared<TrackingReference>(rescaled(*reference(), scale));
-  next->covariance = covariance_;
+  history_.note_similarity(log_scale, correction.first_lock, window_poses());
+  auto next = std::make_shared<TrackingReference>(rescaled(*tracking_reference(), scale));
+  next->covariance = history_.covariance();
   const std::lock_guard lock(reference_mutex_);
   reference_ = std::move(next);
   return log_scale;

@@ -41,12 +41,6 @@ std::vector<SE3> unknown_motions(const SE3& around, double mean_rho) {
 
 constexpr std::size_t kMotionsKept = 4;
 
-double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
-  return 1e-9 * static_cast<double>(to_ns - from_ns);
-}
-
-SE3 scaled_motion(const SE3& motion, double factor) { return SE3::exp(factor * motion.log()); }
-
 /// Steps to either side of a grid, of which the outermost is at `reach`, or nearer when that takes
 /// more than `most`.
 int steps_to(double reach, double step, int most) {
@@ -92,55 +86,27 @@ std::vector<SE3> knocked_motions(const KnownMotion& known, const CameraModel& le
   return out;
 }
 
-/// Whether a camera that was on its way can be where it was found.
-bool is_reachable(const KnownMotion& known, const SE3& T_current_reference) {
-  const Vec3 found = T_current_reference.inverse().translation();
-  return (found - known.expected.inverse().translation()).norm() <= known.reach;
+Mat6 covariance_of(const TrackingResult& tracking, double gradient_scatter) {
+  const double variance = frame_variance(tracking.rmse, gradient_scatter);
+  const Mat6 information = tracking.information / variance + 1e-6 * Mat6::Identity();
+  return information.inverse();
 }
 
 }  // namespace
 
 void DirectOdometry::find_motion_hypotheses(const TrackingReference& reference,
                                             const MonoFrame& frame, double max_acceleration) {
-  const SE3 T_reference_world = reference.T_world_camera.inverse();
-  // Past frames relative to the reference, in its scale.
-  std::array<SE3, 2> from_reference;
-  std::size_t known = 0;
-  for (const PastFrame& past : past_) {
-    if (past.stamp_ns == reference.stamp_ns) {
-      from_reference[known++] = SE3();
-      continue;
-    }
-    for (const auto& [id, T_world_keyframe] : reference.keyframe_poses) {
-      if (id != past.keyframe_id) continue;
-      SE3 T = past.T_camera_keyframe;
-      T.translation() *= std::exp(reference.log_scale - past.log_scale);
-      from_reference[known++] = T * (T_reference_world * T_world_keyframe).inverse();
-      break;
-    }
-  }
-  known_motion_.reset();
-  const SE3 last = known == 0 ? SE3() : from_reference[known - 1];
-  if (known < 2) {
+  const MotionModel::Forecast forecast =
+      motion_.forecast(reference, frame.stamp_ns, max_acceleration);
+  known_motion_ = forecast.known;
+  if (!known_motion_) {
     hypotheses_ = tracker_.rank(reference, *frame.pyramid, frame.exposure_s, last_affine_,
-                                unknown_motions(last, reference.mean_rho), kMotionsKept);
+                                unknown_motions(forecast.last, reference.mean_rho), kMotionsKept);
     return;
   }
-  // Constant velocity over the true time between the frames, which may have been dropped.
-  const SE3 motion = last * from_reference[0].inverse();
-  const SE3 expected = scaled_motion(motion, expected_steps_) * last;
-  known_motion_ = {.expected = expected, .last = last, .steps = expected_steps_};
-  if (max_acceleration > 0.0) {
-    // The velocity is that of the middle between the past frames.
-    const double before = seconds_between(past_[0].stamp_ns, past_[1].stamp_ns);
-    const double since = seconds_between(past_[1].stamp_ns, frame.stamp_ns);
-    // Stamps and poses err as well, which counts where frames are close in time.
-    constexpr double kErrors = 0.02;  // of the mean depth
-    known_motion_->reach =
-        0.5 * max_acceleration * std::abs(since * (since + before)) + kErrors / reference.mean_rho;
-  }
-  hypotheses_ = {expected, scaled_motion(motion, 2.0 * expected_steps_) * last,
-                 scaled_motion(motion, 0.5 * expected_steps_) * last, last, SE3()};
+  const KnownMotion& known = *known_motion_;
+  hypotheses_ = {known.expected, known.after(2.0 * known.steps), known.after(0.5 * known.steps),
+                 known.last, SE3()};
 }
 
 TrackingResult DirectOdometry::track_from_any(const TrackingReference& reference,
@@ -170,12 +136,7 @@ TrackingResult DirectOdometry::align(const TrackingReference& reference, const M
 }
 
 TrackedFrame DirectOdometry::track(const MonoFrame& frame, double max_acceleration) {
-  expected_steps_ = 1.0;
-  if (past_.size() == 2 && past_[1].stamp_ns > past_[0].stamp_ns) {
-    const auto before = static_cast<double>(past_[1].stamp_ns - past_[0].stamp_ns);
-    expected_steps_ = static_cast<double>(frame.stamp_ns - past_[1].stamp_ns) / before;
-  }
-  auto ref = reference();
+  auto ref = tracking_reference();
   find_motion_hypotheses(*ref, frame, max_acceleration);
   return track_hypotheses(frame, std::move(ref));
 }
@@ -183,7 +144,7 @@ TrackedFrame DirectOdometry::track(const MonoFrame& frame, double max_accelerati
 TrackedFrame DirectOdometry::track_from(const MonoFrame& frame, const SE3& T_current_reference) {
   known_motion_.reset();
   hypotheses_ = {T_current_reference};
-  return track_hypotheses(frame, reference());
+  return track_hypotheses(frame, tracking_reference());
 }
 
 TrackedHistory DirectOdometry::compare_with_past(const TrackingReference& reference,
@@ -198,8 +159,8 @@ TrackedHistory DirectOdometry::compare_with_past(const TrackingReference& refere
   sharpest_ = std::max(kForget * sharpest_, tracked.sharpness);
   TrackedHistory out{.first_rmse = first_rmse_};
   out.blurred = tracked.sharpness < config_.keyframe.blurred_sharpness * sharpest_;
-  if (!past_.empty()) {
-    const double since_last = seconds_between(past_.back().stamp_ns, frame.stamp_ns);
+  if (const auto last_stamp_ns = motion_.last_stamp_ns()) {
+    const double since_last = seconds_between(*last_stamp_ns, frame.stamp_ns);
     out.frames = std::max(1.0, seconds_between(reference.stamp_ns, frame.stamp_ns) / since_last);
   }
   return out;
@@ -207,25 +168,26 @@ TrackedHistory DirectOdometry::compare_with_past(const TrackingReference& refere
 
 TrackedFrame DirectOdometry::track_hypotheses(const MonoFrame& frame,
                                               std::shared_ptr<const TrackingReference> reference) {
+  const TrackingReference& ref = *reference;
   TrackedFrame out;
   out.frame = frame;
+  const TrackingResult tracking = align(ref, frame);
+  out.tracking = tracking;
   out.reference = std::move(reference);
-  const TrackingReference& ref = *out.reference;
-  out.tracking = align(ref, frame);
-  if (!out.tracking.good) return out;
+  if (!tracking.good) return out;
 
-  const TrackedHistory history = compare_with_past(ref, frame, out.tracking);
-  last_tracking_ = {out.tracking.rmse, out.tracking.inlier_ratio};
-  last_affine_ = out.tracking.affine;
-  out.T_world_camera = ref.T_world_camera * out.tracking.T_current_reference.inverse();
+  const TrackedHistory history = compare_with_past(ref, frame, tracking);
+  last_tracking_ = {tracking.rmse, tracking.inlier_ratio};
+  last_affine_ = tracking.affine;
+  out.affine = tracking.affine;
+  out.T_world_camera = ref.T_world_camera * tracking.T_current_reference.inverse();
+  out.covariance = covariance_of(tracking, ref.gradient_scatter);
   const PointMotion motion =
-      motion_of_points(ref, out.tracking.T_current_reference,
+      motion_of_points(ref, tracking.T_current_reference,
                        config_.keyframe.max_translation_flow * pixels_for_one_of_vga(camera_));
-  out.wants_keyframe = wants_keyframe(config_.keyframe, camera_, ref, out.tracking, motion,
-                                      frame.exposure_s, history);
-  past_.push_back(
-      {out.tracking.T_current_reference, ref.log_scale, ref.keyframe_id, frame.stamp_ns});
-  if (past_.size() > 2) past_.erase(past_.begin());
+  out.wants_keyframe =
+      wants_keyframe(config_.keyframe, camera_, ref, tracking, motion, frame.exposure_s, history);
+  motion_.note(ref, tracking.T_current_reference, frame.stamp_ns);
   return out;
 }
 

@@ -276,15 +276,10 @@ TrackingReference build_tracking_reference(const Window& window, int num_levels)
 
 TrackingReference rescaled(const TrackingReference& reference, double scale) {
   TrackingReference out = reference;
-  const Vec3 centre = reference.T_world_camera.translation();
+  rescale(scale, &out);
   for (ReferenceLevel& level : out.levels) {
     for (float& rho : level.rho) rho /= static_cast<float>(scale);
   }
-  for (auto& [id, T] : out.keyframe_poses) {
-    T.translation() = centre + scale * (T.translation() - centre);
-  }
-  out.mean_rho /= scale;
-  out.log_scale += std::log(scale);
   return out;
 }
 

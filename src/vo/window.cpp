@@ -7,16 +7,6 @@
 
 namespace sovo {
 
-BrightnessTransfer brightness_transfer(const Affine& host, double host_exposure,
-                                       const Affine& target, double target_exposure) {
-  const bool known = host_exposure > 0.0 && target_exposure > 0.0;
-  const double ratio = known ? target_exposure / host_exposure : 1.0;
-  BrightnessTransfer out;
-  out.gain = std::exp(target.a - host.a) * ratio;
-  out.bias = target.b - out.gain * host.b;
-  return out;
-}
-
 void Keyframe::set_x(const Vec8& value) {
   x = value;
   T_camera_world = SE3::exp(x.head<6>()) * frozen_T_camera_world;

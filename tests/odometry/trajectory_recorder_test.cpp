@@ -138,7 +138,7 @@ TEST(RefinedKeyframePoses, OfNoneAreNone) { EXPECT_TRUE(refined_keyframe_poses({
 
 TrackedFrame tracked(std::int64_t stamp_ns, std::uint32_t keyframe_id, const SE3& T_frame_keyframe,
                      double log_scale) {
-  auto reference = std::make_shared<TrackingReference>();
+  auto reference = std::make_shared<ReferenceKeyframe>();
   reference->keyframe_id = keyframe_id;
   reference->log_scale = log_scale;
   TrackedFrame t;

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <limits>
+
+#include "sovo/geometry/types.h"
+
+namespace sovo {
+
+/// What bundle adjustment of a window came to.
+struct BundleResult {
+  double rmse = 0.0;  ///< Of the residuals, an outlier counting its threshold [grey levels].
+  int iterations = 0;
+  int points = 0;
+  int residuals = 0;
+  bool finite = true;  ///< False: the solve broke down; the window must be thrown away.
+  /// Covariance of the newest keyframe's pose as seen from the keyframe before it (left
+  /// perturbation of T_newest_before: translation [the window's unit], rotation [rad]), the
+  /// window's scale held. Of two keyframes or more.
+  Mat6 newest_covariance = Mat6::Zero();
+  /// Of a common factor of all depths, by the static residuals; infinite without any.
+  double scale_variance = std::numeric_limits<double>::infinity();
+  double gradient_scatter = 1.0;  ///< Of the residuals into the newest keyframe.
+};
+
+}  // namespace sovo

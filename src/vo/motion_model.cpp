@@ -1,0 +1,78 @@
+#include "sovo/vo/motion_model.h"
+
+#include <array>
+#include <cmath>
+
+namespace sovo {
+
+double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
+  return 1e-9 * static_cast<double>(to_ns - from_ns);
+}
+
+SE3 scaled_motion(const SE3& motion, double factor) { return SE3::exp(factor * motion.log()); }
+
+SE3 KnownMotion::after(double steps_since) const { return scaled_motion(step, steps_since) * last; }
+
+bool is_reachable(const KnownMotion& known, const SE3& T_current_reference) {
+  const Vec3 found = T_current_reference.inverse().translation();
+  return (found - known.expected.inverse().translation()).norm() <= known.reach;
+}
+
+void MotionModel::note(const ReferenceKeyframe& reference, const SE3& T_camera_reference,
+                       std::int64_t stamp_ns) {
+  past_.push_back({T_camera_reference, reference.log_scale, reference.keyframe_id, stamp_ns});
+  if (past_.size() > 2) past_.erase(past_.begin());
+}
+
+std::optional<std::int64_t> MotionModel::last_stamp_ns() const {
+  if (past_.empty()) return std::nullopt;
+  return past_.back().stamp_ns;
+}
+
+double MotionModel::steps_to(std::int64_t stamp_ns) const {
+  const std::int64_t before = past_[1].stamp_ns - past_[0].stamp_ns;
+  if (before <= 0) return 1.0;
+  return static_cast<double>(stamp_ns - past_[1].stamp_ns) / static_cast<double>(before);
+}
+
+MotionModel::Forecast MotionModel::forecast(const ReferenceKeyframe& reference,
+                                            std::int64_t stamp_ns, double max_acceleration) const {
+  const SE3 T_reference_world = reference.T_world_camera.inverse();
+  // Past frames relative to the reference, in its scale.
+  std::array<SE3, 2> from_reference;
+  std::size_t known = 0;
+  for (const PastFrame& past : past_) {
+    if (past.stamp_ns == reference.stamp_ns) {
+      from_reference[known++] = SE3();
+      continue;
+    }
+    for (const auto& [id, T_world_keyframe] : reference.keyframe_poses) {
+      if (id != past.keyframe_id) continue;
+      SE3 T = past.T_camera_keyframe;
+      T.translation() *= std::exp(reference.log_scale - past.log_scale);
+      from_reference[known++] = T * (T_reference_world * T_world_keyframe).inverse();
+      break;
+    }
+  }
+  Forecast out;
+  out.last = known == 0 ? SE3() : from_reference[known - 1];
+  if (known < 2) return out;
+  KnownMotion motion{.expected = {},
+                     .last = out.last,
+                     .step = out.last * from_reference[0].inverse(),
+                     .steps = steps_to(stamp_ns)};
+  motion.expected = motion.after(motion.steps);
+  if (max_acceleration > 0.0) {
+    // The velocity is that of the middle between the past frames.
+    const double before = seconds_between(past_[0].stamp_ns, past_[1].stamp_ns);
+    const double since = seconds_between(past_[1].stamp_ns, stamp_ns);
+    // Stamps and poses err as well, which counts where frames are close in time.
+    constexpr double kErrors = 0.02;  // of the mean depth
+    motion.reach =
+        0.5 * max_acceleration * std::abs(since * (since + before)) + kErrors / reference.mean_rho;
+  }
+  out.known = motion;
+  return out;
+}
+
+}  // namespace sovo

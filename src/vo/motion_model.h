@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "sovo/vo/monocular_backend.h"
+
+namespace sovo {
+
+double seconds_between(std::int64_t from_ns, std::int64_t to_ns);
+
+/// Where the camera was in the last frame, and where the new one should find it
+/// (T_camera_reference).
+struct KnownMotion {
+  SE3 expected;
+  SE3 last;
+  SE3 step;            ///< From the frame before the last one to that: T_last_before.
+  double steps = 1.0;  ///< Time since then over that between the two frames before.
+  /// How far from there it may be, at the greatest acceleration and with what stamps and poses err
+  /// by [the map's unit of length]; infinite: not known.
+  double reach = std::numeric_limits<double>::infinity();
+
+  /// Where the step before leads in `steps` times its time.
+  SE3 after(double steps_since) const;
+};
+
+/// Whether a camera that was on its way can be where it was found.
+bool is_reachable(const KnownMotion& known, const SE3& T_current_reference);
+
+/// The same motion in `factor` times its time.
+SE3 scaled_motion(const SE3& motion, double factor);
+
+/// Constant velocity over the true time between frames, some of which may be missing.
+class MotionModel {
+ public:
+  void clear() { past_.clear(); }
+
+  /// Notes where a frame was found.
+  void note(const ReferenceKeyframe& reference, const SE3& T_camera_reference,
+            std::int64_t stamp_ns);
+
+  /// The last frame's T_camera_reference, the identity when there was none.
+  struct Forecast {
+    SE3 last;
+    std::optional<KnownMotion> known;  ///< When two frames before are known.
+  };
+
+  /// Of a frame at `stamp_ns`. `max_acceleration`: what `KnownMotion::reach` follows from [the
+  /// map's unit of length / s^2]; 0: unknown.
+  Forecast forecast(const ReferenceKeyframe& reference, std::int64_t stamp_ns,
+                    double max_acceleration) const;
+
+  /// Of the last frame.
+  std::optional<std::int64_t> last_stamp_ns() const;
+
+ private:
+  struct PastFrame {
+    SE3 T_camera_keyframe;
+    double log_scale = 0.0;
+    std::uint32_t keyframe_id = 0;
+    std::int64_t stamp_ns = 0;
+  };
+  double steps_to(std::int64_t stamp_ns) const;
+
+  std::vector<PastFrame> past_;  ///< The last two frames, newest last.
+};
+
+}  // namespace sovo

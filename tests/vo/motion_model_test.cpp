@@ -1,0 +1,83 @@
+#include "sovo/vo/motion_model.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace sovo {
+namespace {
+
+constexpr std::int64_t kFrame = 50'000'000;
+
+ReferenceKeyframe reference_at(std::uint32_t id, const SE3& T_world_camera) {
+  ReferenceKeyframe out;
+  out.keyframe_id = id;
+  out.stamp_ns = -1;
+  out.T_world_camera = T_world_camera;
+  out.keyframe_poses = {{id, T_world_camera}};
+  return out;
+}
+
+/// T_camera_world of a camera that goes on and turns evenly.
+SE3 on_its_way(double frames) {
+  Vec6 velocity;
+  velocity << 0.1, 0.0, 0.4, 0.0, 0.02, 0.01;
+  return SE3::exp(frames * velocity);
+}
+
+TEST(MotionModel, GoesOnEvenlyOverTheTimeThatPassed) {
+  const ReferenceKeyframe reference = reference_at(0, SE3());
+  MotionModel model;
+  EXPECT_FALSE(model.forecast(reference, 0, 0.0).known) << "nothing was seen";
+  model.note(reference, on_its_way(1.0), kFrame);
+  EXPECT_FALSE(model.forecast(reference, 2 * kFrame, 0.0).known) << "one frame is no motion";
+  model.note(reference, on_its_way(2.0), 2 * kFrame);
+  for (const double frames : {3.0, 5.5}) {  // two and a half are missing in the second
+    const auto stamp = static_cast<std::int64_t>(frames * static_cast<double>(kFrame));
+    const auto known = model.forecast(reference, stamp, 0.0).known;
+    ASSERT_TRUE(known);
+    EXPECT_LT((known->expected * on_its_way(frames).inverse()).log().norm(), 1e-9);
+    EXPECT_NEAR(known->steps, frames - 2.0, 1e-12);
+    EXPECT_TRUE(std::isinf(known->reach));
+  }
+}
+
+TEST(MotionModel, FollowsItsKeyframesIntoANewReferenceAndANewScale) {
+  const ReferenceKeyframe old = reference_at(0, SE3());
+  MotionModel model;
+  model.note(old, on_its_way(1.0), kFrame);
+  model.note(old, on_its_way(2.0), 2 * kFrame);
+  // The next keyframe stands a way off, and the map was made twice as large since.
+  SE3 T_world_next(SO3::exp(Vec3(0, 0.1, 0)), Vec3(0.2, 0.0, 1.0));
+  ReferenceKeyframe next = reference_at(1, T_world_next);
+  next.keyframe_poses.emplace_back(0, SE3());
+  next.log_scale = std::log(2.0);
+  const auto known = model.forecast(next, 3 * kFrame, 0.0).known;
+  ASSERT_TRUE(known);
+  const auto doubled = [](SE3 T) {
+    T.translation() *= 2.0;
+    return T;
+  };
+  const SE3 truth = doubled(on_its_way(3.0)) * T_world_next;
+  EXPECT_LT((known->expected * truth.inverse()).log().norm(), 1e-9);
+  EXPECT_FALSE(model.forecast(reference_at(7, SE3()), 3 * kFrame, 0.0).known)
+      << "the keyframe that it hangs on has left the window";
+}
+
+TEST(MotionModel, AccelerationLimitsTheReach) {
+  const ReferenceKeyframe reference = reference_at(0, SE3());
+  MotionModel model;
+  model.note(reference, on_its_way(1.0), kFrame);
+  model.note(reference, on_its_way(2.0), 2 * kFrame);
+  const auto known = model.forecast(reference, 3 * kFrame, 10.0).known;
+  ASSERT_TRUE(known);
+  EXPECT_NEAR(known->reach, 10.0 * 0.05 * 0.05 + 0.02, 1e-9);
+  SE3 beside = known->expected;
+  beside.translation().x() += 0.9 * known->reach;
+  EXPECT_TRUE(is_reachable(*known, beside));
+  beside.translation().x() += 0.3 * known->reach;
+  EXPECT_FALSE(is_reachable(*known, beside));
+}
+
+}  // namespace
+}  // namespace sovo

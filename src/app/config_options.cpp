@@ -21,6 +21,26 @@ std::vector<std::string> preset_assignments(Preset preset) {
 }
 
 /// Weights of the odometry: a negative one would turn its term's meaning round.
+Result<void> check_backend(const StereoOdometryConfig& odometry) {
+  const FeatureConfig& f = odometry.features;
+  if (f.features < 50) return Error{"features.features must be at least 50"};
+  if (f.levels < 1) return Error{"features.levels must be at least 1"};
+  if (f.max_keyframes < 3) return Error{"features.max_keyframes must be at least 3"};
+  if (f.free_keyframes < 1 || f.free_keyframes >= f.max_keyframes) {
+    return Error{"features.free_keyframes must be at least 1 and less than features.max_keyframes"};
+  }
+  if (!(f.sigma_px > 0.0)) return Error{"features.sigma_px must be positive"};
+  if (!(f.min_corner >= f.weak_corner && f.weak_corner > 0.0)) {
+    return Error{"features.weak_corner must be positive and at most features.min_corner"};
+  }
+  if (odometry.backend == Backend::kFeatures && odometry.mode == OdometryMode::kStereo) {
+    return Error{
+        "backend: features has no static residuals; use mode: scale, or mono (preset: quality sets "
+        "mode: stereo)"};
+  }
+  return {};
+}
+
 Result<void> check_weights(const DirectConfig& vo) {
   const KeyframeConfig& keyframe = vo.keyframe;
   const WindowConfig& window = vo.window;
@@ -206,6 +226,7 @@ Result<void> check_config(const AppConfig& config) {
     return Error{"max_halvings must be 0 to 4"};
   }
   if (config.odometry.mapping_queue < 1) return Error{"mapping_queue must be at least 1"};
+  if (auto backend = check_backend(config.odometry); !backend) return backend;
   if (auto weights = check_weights(config.odometry.vo); !weights) return weights;
   if (auto selection = check_selection(config.odometry.vo.selection); !selection) return selection;
   if (auto assist = check_assist(config.odometry.assist); !assist) return assist;

@@ -16,4 +16,9 @@ inline float from_halved(float x, int halvings) {
   return (x + 0.5F) * static_cast<float>(1 << halvings) - 0.5F;
 }
 
+/// Where a position of the whole image lies in one that was halved so often [px].
+inline float to_halved(float x, int halvings) {
+  return (x + 0.5F) / static_cast<float>(1 << halvings) - 0.5F;
+}
+
 }  // namespace sovo

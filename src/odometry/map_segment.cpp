@@ -5,8 +5,8 @@
 #include <cmath>
 
 #include "sovo/image/halving.h"
+#include "sovo/odometry/new_backend.h"
 #include "sovo/odometry/trajectory_recorder.h"
-#include "sovo/vo/direct_odometry.h"
 
 namespace sovo {
 
@@ -63,13 +63,6 @@ DepthProposal proposal_of(const StaticMatch& match) {
   return {match.inverse_depth, match.sigma};
 }
 
-/// Halving averages the noise of four pixels, so that half the contrast is enough. A quarter is
-/// not, in images halved twice: grey levels are whole numbers, and those maps broke at once.
-DirectConfig for_halved(DirectConfig config, int halvings) {
-  config.selection.least_offset /= 1 << std::min(halvings, 1);
-  return config;
-}
-
 /// Every how many pixels one is a scout: one in eight, or more where that would make fewer than
 /// sixty, of whom too few would be matched to tell the range.
 std::size_t scout_stride(std::size_t num_pixels) {
@@ -107,8 +100,7 @@ MapSegment::MapSegment(const StereoOdometryConfig& config, const FramePreparatio
       halvings_(halvings),
       pool_(pool),
       observer_(observer),
-      vo_(std::make_unique<DirectOdometry>(for_halved(config.vo, halvings), rig().left,
-                                           preparation.left_mask(halvings), config.seed, pool)),
+      vo_(new_backend(config, rig().left, preparation.left_mask(halvings), halvings, pool)),
       matcher_(config.matcher, rig()),
       optimizer_(config.scale, rig()),
       filter_(config.filter),
@@ -137,8 +129,7 @@ bool MapSegment::wants_halving() const {
 }
 
 bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage& right) {
-  const std::vector<SelectedPixel> pixels =
-      vo_->select_pixels(frame, config_.vo.points.active_points);
+  const std::vector<SelectedPixel> pixels = vo_->select_pixels(frame, vo_->wanted_points());
   const auto right_pyramid =
       std::make_shared<const ImagePyramid>(preparation_.prepare_right(right, halvings_));
   const std::vector<StaticMatch> matches = match_all(*frame.pyramid, *right_pyramid, pixels);
@@ -308,7 +299,7 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
   out.map = vo_->map(tracked, keyframe_stereo, timer);
   broken_ = out.map.failed;
   if (!out.map.is_keyframe || out.map.failed) return out;
-  assist_.on_keyframe(static_cast<double>(out.map.active_points) / config_.vo.points.active_points,
+  assist_.on_keyframe(static_cast<double>(out.map.active_points) / vo_->wanted_points(),
                       tracked.tracking.inlier_ratio);
   window_scale_variance_ = out.map.bundle.scale_variance + std::pow(config_.scale.sigma_floor, 2);
   if (observer_ != nullptr) {

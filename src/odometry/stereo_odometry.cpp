@@ -4,6 +4,7 @@
 #include <cmath>
 #include <mutex>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 
 #include "sovo/geometry/pose_covariance.h"
@@ -16,7 +17,12 @@ namespace sovo {
 namespace {
 
 /// With fewer inliers tracking is DEGRADED: of poses that are wrong most, of right ones hardly any.
-constexpr double kDegradedInliers = 0.65;
+double degraded_inliers(Backend backend) { return backend == Backend::kDirect ? 0.65 : 0.5; }
+
+const char* compared_by(Backend backend) {
+  return backend == Backend::kDirect ? "pixels" : "features";
+}
+
 constexpr double kNanosecond = 1e-9;
 
 }  // namespace
@@ -30,6 +36,9 @@ class StereoOdometry::Impl {
         observer_(observer),
         preparation_(config_, cameras),
         pool_(config.threads) {
+    if (config.backend == Backend::kFeatures && config.mode == OdometryMode::kStereo) {
+      throw std::invalid_argument("the feature-based backend has no static residuals");
+    }
     if (!config_.deterministic) {
       threads_ = std::make_unique<LiveThreads>(
           static_cast<std::size_t>(std::max(1, config_.mapping_queue)),
@@ -285,7 +294,8 @@ class StereoOdometry::Impl {
   OdometryState state_of(const OdometryOutput& out, const FrameTracking& t,
                          const std::string& right_problem) const {
     const bool tracked = t.good;
-    if (tracked && t.inlier_ratio < kDegradedInliers) return OdometryState::kDegraded;
+    if (tracked && t.inlier_ratio < degraded_inliers(config_.backend))
+      return OdometryState::kDegraded;
     if (!right_problem.empty()) return OdometryState::kDegraded;
     const bool scaled = config_.mode != OdometryMode::kMono;
     if (scaled && (!out.scale_valid || scale_is_old(out))) return OdometryState::kScaleUnobserved;
@@ -303,8 +313,8 @@ class StereoOdometry::Impl {
                         const std::string& right_problem) const {
     if (!right_problem.empty()) return right_problem + "; the scale is not measured";
     if (out.state == OdometryState::kDegraded) {
-      return "only " + std::to_string(static_cast<int>(100.0 * t.inlier_ratio)) +
-             " % of the pixels agree";
+      return "only " + std::to_string(static_cast<int>(100.0 * t.inlier_ratio)) + " % of the " +
+             compared_by(config_.backend) + " agree";
     }
     if (out.state == OdometryState::kScaleUnobserved) {
       return "scale not measured: " + to_string(out.scale_verdict);

@@ -14,6 +14,7 @@
 #include "sovo/scale/scale_filter.h"
 #include "sovo/scale/scale_optimizer.h"
 #include "sovo/vo/direct_config.h"
+#include "sovo/vo/features/feature_config.h"
 
 namespace sovo {
 
@@ -22,6 +23,12 @@ enum class OdometryMode {
   kMono,    ///< Static matches at the first keyframe only.
   kScale,   ///< Temporal residuals in the window, scale optimization beside it (SO-DSO).
   kStereo,  ///< Static residuals in the window own the scale (as Stereo DSO).
+};
+
+/// Which monocular odometry follows the left camera.
+enum class Backend {
+  kDirect,    ///< By the brightness of many pixels (DirectOdometry).
+  kFeatures,  ///< By corners (FeatureOdometry); not in mode `stereo`.
 };
 
 /// How the map begins.
@@ -50,6 +57,9 @@ constexpr std::array<std::pair<OdometryMode, const char*>, 3> enum_names(Odometr
            {OdometryMode::kScale, "scale"},
            {OdometryMode::kStereo, "stereo"}}};
 }
+constexpr std::array<std::pair<Backend, const char*>, 2> enum_names(Backend) {
+  return {{{Backend::kDirect, "direct"}, {Backend::kFeatures, "features"}}};
+}
 constexpr std::array<std::pair<InitMethod, const char*>, 3> enum_names(InitMethod) {
   return {{{InitMethod::kAuto, "auto"},
            {InitMethod::kStereo, "stereo"},
@@ -67,6 +77,7 @@ constexpr std::array<std::pair<Lighting, const char*>, 2> enum_names(Lighting) {
 
 struct StereoOdometryConfig {
   OdometryMode mode = OdometryMode::kScale;
+  Backend backend = Backend::kDirect;
   InitMethod init = InitMethod::kAuto;
   double init_min_matched = 0.3;  ///< Share of good static matches that `auto` asks for.
   DepthInit depth_init = DepthInit::kStereo;
@@ -84,6 +95,7 @@ struct StereoOdometryConfig {
   double max_acceleration = 100.0;  ///< A pose that takes more is none [m/s^2]; 0: any is taken.
   double scale_timeout_s = 3.0;     ///< Without an accepted scale: state SCALE_UNOBSERVED.
   DirectConfig vo;
+  FeatureConfig features;
   ScaleOptimizerConfig scale;
   ScaleFilterConfig filter;
   StaticMatcherConfig matcher;
@@ -92,6 +104,7 @@ struct StereoOdometryConfig {
   template <class Visitor>
   void visit(Visitor& v) {
     v("mode", mode, "who owns the metric scale");
+    v("backend", backend, "which monocular odometry follows the left camera");
     v("init", init, "how the map begins");
     v("init_min_matched", init_min_matched,
       "share of good static matches that init: auto asks for");
@@ -112,6 +125,7 @@ struct StereoOdometryConfig {
       "a pose that takes more since the frames before is none [m/s^2]; 0: no limit");
     v("scale_timeout_s", scale_timeout_s, "without an accepted scale: SCALE_UNOBSERVED [s]");
     v("vo", vo, "direct monocular odometry");
+    v("features", features, "feature-based monocular odometry");
     v("scale", scale, "scale optimization");
     v("filter", filter, "scale filter");
     v("matcher", matcher, "static stereo matching");
@@ -135,7 +149,8 @@ struct StereoCameras {
 /// and publishes its pose; mapping and scale optimization run on threads of their own.
 class StereoOdometry {
  public:
-  /// `sink` must outlive the odometry; `observer` may be null.
+  /// `sink` must outlive the odometry; `observer` may be null. Throws std::invalid_argument for
+  /// mode `stereo` with the backend `features`, which has no static residuals.
   StereoOdometry(const StereoOdometryConfig& config, const StereoCameras& cameras, OutputSink* sink,
                  StageObserver* observer = nullptr);
   ~StereoOdometry();

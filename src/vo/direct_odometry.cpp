@@ -1,13 +1,13 @@
 #include "sovo/vo/direct_odometry.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include "sovo/vo/epipolar_search.h"
 #include "sovo/vo/keyframe_policy.h"
 #include "sovo/vo/marginalization.h"
+#include "sovo/vo/stage_timer.h"
 #include "sovo/vo/static_residual.h"
 #include "sovo/vo/view_forecast.h"
 
@@ -17,27 +17,7 @@ namespace {
 
 /// Noise of one pixel of a residual, from which depth information follows [grey levels].
 constexpr double kPixelNoise = 5.0;
-/// A point whose log-depth is known worse than this says nothing about scale.
-constexpr double kMaxRelativeSigma = 0.5;
 constexpr double kMaxBundleRmse = 30.0;
-
-class StageTimer {
- public:
-  StageTimer(const MapTimer& timer, MapStage stage)
-      : timer_(timer), stage_(stage), start_(std::chrono::steady_clock::now()) {}
-  ~StageTimer() {
-    if (!timer_) return;
-    const std::chrono::duration<double> d = std::chrono::steady_clock::now() - start_;
-    timer_(stage_, d.count());
-  }
-  StageTimer(const StageTimer&) = delete;
-  StageTimer& operator=(const StageTimer&) = delete;
-
- private:
-  const MapTimer& timer_;
-  MapStage stage_;
-  std::chrono::steady_clock::time_point start_;
-};
 
 PixelSelectorConfig selector_config(PixelSelectorConfig config, int seed) {
   config.seed = seed + 1;

@@ -31,6 +31,7 @@ class DirectOdometry final : public MonocularBackend {
                  int seed, WorkerPool* pool);
 
   void use_static_residuals(const StereoRig& rig) override { window_.set_rig(rig); }
+  int wanted_points() const override { return config_.points.active_points; }
   std::vector<SelectedPixel> select_pixels(const MonoFrame& frame, int wanted) override;
   /// Points with a depth become active, the others immature.
   void begin(const MonoFrame& frame, const SE3& T_world_camera,

@@ -4,40 +4,11 @@
 
 #include "sovo/vo/direct_odometry.h"
 #include "sovo/vo/keyframe_policy.h"
+#include "sovo/vo/motion_hypotheses.h"
 
 namespace sovo {
 
 namespace {
-
-/// Rotations tried beside translations when nothing is known [rad]: 2.3, 3.2 and 4.0 degrees over
-/// one, two and three axes.
-constexpr double kUnknownRotation = 0.04;
-
-void add_rotations(const SE3& around, std::vector<SE3>* hypotheses) {
-  for (int i = 0; i < 27; ++i) {
-    const Vec3 axis(i % 3 - 1, (i / 3) % 3 - 1, i / 9 - 1);
-    if (axis.isZero()) continue;
-    hypotheses->push_back(SE3(SO3::exp(kUnknownRotation * axis), Vec3::Zero()) * around);
-  }
-}
-
-/// Motions to try when none is known: translations along each axis in shares of the mean depth,
-/// and rotations.
-std::vector<SE3> unknown_motions(const SE3& around, double mean_rho) {
-  constexpr std::array<double, 7> kShares = {0.02, 0.04, 0.07, 0.11, 0.16, 0.23, 0.32};
-  std::vector<SE3> out = {around};
-  for (const double share : kShares) {
-    for (int axis = 0; axis < 3; ++axis) {
-      for (const double sign : {-1.0, 1.0}) {
-        Vec3 t = Vec3::Zero();
-        t[axis] = sign * share / mean_rho;
-        out.push_back(SE3(SO3(), t) * around);
-      }
-    }
-  }
-  add_rotations(around, &out);
-  return out;
-}
 
 constexpr std::size_t kMotionsKept = 4;
 
@@ -183,7 +154,7 @@ TrackedFrame DirectOdometry::track_hypotheses(const MonoFrame& frame,
   out.T_world_camera = ref.T_world_camera * tracking.T_current_reference.inverse();
   out.covariance = covariance_of(tracking, ref.gradient_scatter);
   const PointMotion motion =
-      motion_of_points(ref, tracking.T_current_reference,
+      motion_of_points(ref.levels[0], tracking.T_current_reference,
                        config_.keyframe.max_translation_flow * pixels_for_one_of_vga(camera_));
   out.wants_keyframe =
       wants_keyframe(config_.keyframe, camera_, ref, tracking, motion, frame.exposure_s, history);

@@ -38,20 +38,24 @@ double pixels_for_one_of_vga(const CameraModel& camera) {
   return (camera.width + camera.height) / (640.0 + 480.0);
 }
 
+double motion_score(const KeyframeConfig& config, const CameraModel& camera,
+                    const PointMotion& motion) {
+  const double unit = 1.0 / pixels_for_one_of_vga(camera);
+  return config.flow_translation * unit * motion.flow_translation +
+         config.flow_total * unit * motion.flow_total + config.approach * motion.approach;
+}
+
 bool wants_keyframe(const KeyframeConfig& config, const CameraModel& camera,
                     const TrackingReference& reference, const TrackingResult& tracked,
                     const PointMotion& motion, double exposure_s, const TrackedHistory& history) {
-  const double unit = 1.0 / pixels_for_one_of_vga(camera);
   const BrightnessTransfer transfer =
       brightness_transfer(reference.affine, reference.exposure_s, tracked.affine, exposure_s);
-  const double motion_score = config.flow_translation * unit * motion.flow_translation +
-                              config.flow_total * unit * motion.flow_total +
-                              config.approach * motion.approach;
+  const double moved = motion_score(config, camera, motion);
   // All that is tracked against a blurred keyframe suffers, so a sharp one is waited for while the
   // next frame will still be near. Blur takes contrast, which says nothing of the light.
-  const double next_score = motion_score * (1.0 + 1.0 / history.frames);
+  const double next_score = moved * (1.0 + 1.0 / history.frames);
   if (history.blurred && next_score < config.blurred_max_score) return false;
-  const double score = motion_score + config.brightness * std::abs(std::log(transfer.gain));
+  const double score = moved + config.brightness * std::abs(std::log(transfer.gain));
   // The residual of a camera at rest is noise, and twice of it nothing that a keyframe would mend:
   // without parallax the window's scale would be left to that noise.
   const bool fits_badly =

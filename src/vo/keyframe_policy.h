@@ -13,6 +13,10 @@ namespace sovo {
 /// Pixels of `camera` for one of a VGA image, in which the flows of `KeyframeConfig` are given.
 double pixels_for_one_of_vga(const CameraModel& camera);
 
+/// What a motion of points weighs; above 1 it makes a keyframe.
+double motion_score(const KeyframeConfig& config, const CameraModel& camera,
+                    const PointMotion& motion);
+
 /// How a frame that was tracked compares with those before it.
 struct TrackedHistory {
   double first_rmse = 0.0;  ///< Of the first frame tracked against this reference.

@@ -95,6 +95,9 @@ struct TrackedFrame {
   std::shared_ptr<const FrameViews> views;  ///< Null where the backend keeps none.
 };
 
+/// A point whose log-depth is known worse than this says nothing about scale.
+inline constexpr double kMaxRelativeSigma = 0.5;
+
 /// A keyframe with points of its own: those that left the window, and those still active.
 struct KeyframeState {
   std::uint32_t id = 0;
@@ -135,6 +138,9 @@ class MonocularBackend {
   /// From now on keyframes with a right image get static residuals, which hold the scale.
   /// `rig.left` is the camera that is tracked. Throws std::logic_error where a backend has none.
   virtual void use_static_residuals(const StereoRig& rig) = 0;
+
+  /// Points that a map should have.
+  virtual int wanted_points() const = 0;
 
   /// Chooses the pixels that a map would begin with.
   virtual std::vector<SelectedPixel> select_pixels(const MonoFrame& frame, int wanted) = 0;

@@ -6,6 +6,7 @@
 #include "sovo/geometry/camera_model.h"
 #include "sovo/geometry/so3.h"
 #include "sovo/image/pyramid.h"
+#include "sovo/vo/patch_alignment.h"
 
 namespace sovo {
 
@@ -40,10 +41,6 @@ struct PatchTrack {
 /// rotation predicts it.
 class PatchTracker {
  public:
-  static constexpr int kRadius = 3;
-  static constexpr int kSide = 2 * kRadius + 1;
-  static constexpr int kSize = kSide * kSide;
-
   explicit PatchTracker(const PatchTrackerConfig& config = {}) : config_(config) {}
 
   /// A position of the first frame's level 0.
@@ -52,7 +49,7 @@ class PatchTracker {
   };
 
   /// Begins with the most corner-like of `candidates`.
-  void set_first(const ImagePyramid& pyramid, const CameraModel& pinhole,
+  void set_first(ImagePyramidPtr pyramid, const CameraModel& pinhole,
                  const std::vector<Position>& candidates);
 
   /// Finds the patches in the next frame. `R_new_last`: rotation since the frame before, which
@@ -66,23 +63,11 @@ class PatchTracker {
   float gain() const { return gain_; }
 
  private:
-  /// A patch at one level: values and gradients less their means, the inverse of the 2x2 Hessian.
-  struct Patch {
-    bool usable = false;
-    float norm = 0.F;
-    float inverse_hessian[3] = {};  // xx, xy, yy
-    float value[kSize], gx[kSize], gy[kSize];
-  };
-
-  bool make_patch(const ImageF& image, float x, float y, Patch* patch, float* min_eigenvalue) const;
-  void follow(const ImagePyramid& pyramid, const float A[4], std::size_t index, float* contrast);
-
   PatchTrackerConfig config_;
   CameraModel camera_;
-  int levels_ = 0;
+  ImagePyramidPtr first_;
   float gain_ = 1.0F;
   std::vector<PatchTrack> tracks_;
-  std::vector<Patch> patches_;  // [track * levels_ + level]
   std::vector<float> contrasts_;
 };
 

@@ -16,19 +16,18 @@ Vec2 clipped(const Vec2& flow, double most) {
 
 }  // namespace
 
-PointMotion motion_of_points(const TrackingReference& reference, const SE3& T_current_reference,
+PointMotion motion_of_points(const ReferenceLevel& points, const SE3& T_current_reference,
                              double max_translation) {
-  const ReferenceLevel& level = reference.levels[0];
-  const std::size_t stride = std::max<std::size_t>(1, level.size() / kLeastPoints);
-  const Mat3 K = level.camera.matrix();
+  const std::size_t stride = std::max<std::size_t>(1, points.size() / kLeastPoints);
+  const Mat3 K = points.camera.matrix();
   const Mat3 KRKi = K * T_current_reference.rotation_matrix() * K.inverse();
   const Vec3 Kt = K * T_current_reference.translation();
   PointMotion sum;
   int n = 0;
-  for (std::size_t i = 0; i < level.size(); i += stride) {
-    const Vec3 p(level.u[i], level.v[i], 1.0);
+  for (std::size_t i = 0; i < points.size(); i += stride) {
+    const Vec3 p(points.u[i], points.v[i], 1.0);
     const Vec3 turned = KRKi * p;
-    const Vec3 kt = Kt * level.rho[i];
+    const Vec3 kt = Kt * points.rho[i];
     const Vec2 rotation = turned.hnormalized() - p.head<2>();
     for (const double sign : {1.0, -1.0}) {
       const Vec2 straight = (p + sign * kt).hnormalized() - p.head<2>();

@@ -76,7 +76,7 @@ bool TwoViewInitializer::set_first(std::int64_t stamp_ns, ImagePyramidPtr pyrami
   for (const SelectedPixel& p : pixels_) {
     candidates.push_back({static_cast<float>(p.x), static_cast<float>(p.y)});
   }
-  tracker_.set_first(*first_, camera_, candidates);
+  tracker_.set_first(first_, camera_, candidates);
   const int patches = static_cast<int>(tracker_.tracks().size());
   const bool enough = patches >= config_.min_matches;
   reason_ = enough ? "no frame followed the first one"

@@ -12,33 +12,31 @@ namespace {
 constexpr double kUnclipped = 1e9;
 
 /// Points in a row across the image, of these inverse depths.
-TrackingReference reference_of(const std::vector<float>& rho) {
-  TrackingReference out;
-  out.levels.resize(1);
-  ReferenceLevel& level = out.levels[0];
+ReferenceLevel points_of(const std::vector<float>& rho) {
+  ReferenceLevel level;
   level.camera = test::make_camera(640, 480, 400.0, 400.0, 319.5, 239.5);
   for (std::size_t i = 0; i < rho.size(); ++i) {
     level.u.push_back(100.0F + 4.0F * static_cast<float>(i));
     level.v.push_back(200.0F);
     level.rho.push_back(rho[i]);
   }
-  return out;
+  return level;
 }
 
 TEST(MotionOfPoints, IsThatOfAKnownMotion) {
-  const TrackingReference reference = reference_of(std::vector<float>(100, 0.25F));
-  const PointMotion aside = motion_of_points(reference, SE3(SO3(), Vec3(0.1, 0, 0)), kUnclipped);
+  const ReferenceLevel points = points_of(std::vector<float>(100, 0.25F));
+  const PointMotion aside = motion_of_points(points, SE3(SO3(), Vec3(0.1, 0, 0)), kUnclipped);
   const double flow = 400.0 * 0.1 * 0.25;
   EXPECT_NEAR(aside.flow_translation, flow, 1e-6);
   EXPECT_NEAR(aside.flow_total, flow, 1e-6);
   EXPECT_NEAR(aside.approach, 0.0, 1e-12);
   const PointMotion turn =
-      motion_of_points(reference, SE3(SO3::exp(Vec3(0, 0, 0.1)), Vec3::Zero()), kUnclipped);
+      motion_of_points(points, SE3(SO3::exp(Vec3(0, 0, 0.1)), Vec3::Zero()), kUnclipped);
   EXPECT_NEAR(turn.flow_translation, 0.0, 1e-9);
   EXPECT_GT(turn.flow_total, 2.0);
   EXPECT_NEAR(turn.approach, 0.0, 1e-12);
   for (const double z : {-0.2, 0.2}) {
-    EXPECT_NEAR(motion_of_points(reference, SE3(SO3(), Vec3(0, 0, z)), kUnclipped).approach, 0.05,
+    EXPECT_NEAR(motion_of_points(points, SE3(SO3(), Vec3(0, 0, z)), kUnclipped).approach, 0.05,
                 1e-9);
   }
 }
@@ -48,18 +46,18 @@ TEST(MotionOfPoints, NearPointsDoNotStandForTheOthers) {
   std::vector<float> rho(100, 0.1F);
   rho[50] = 10.0F;
   const SE3 aside(SO3(), Vec3(0.1, 0, 0));
-  EXPECT_NEAR(motion_of_points(reference_of(rho), aside, kUnclipped).flow_total, 40.2, 0.1);
-  const PointMotion clipped = motion_of_points(reference_of(rho), aside, 20.0);
+  EXPECT_NEAR(motion_of_points(points_of(rho), aside, kUnclipped).flow_total, 40.2, 0.1);
+  const PointMotion clipped = motion_of_points(points_of(rho), aside, 20.0);
   EXPECT_NEAR(clipped.flow_total, 4.455, 1e-3);  // the root of 0.99 * 4^2 + 0.01 * 20^2
   EXPECT_NEAR(clipped.flow_translation, 4.455, 1e-3);
 }
 
 TEST(MotionOfPoints, ATurnCountsInFullWhateverIsClipped) {
-  const TrackingReference reference = reference_of(std::vector<float>(100, 0.25F));
+  const ReferenceLevel points = points_of(std::vector<float>(100, 0.25F));
   const SE3 turn(SO3::exp(Vec3(0, 0.3, 0)), Vec3::Zero());
-  const double whole = motion_of_points(reference, turn, kUnclipped).flow_total;
+  const double whole = motion_of_points(points, turn, kUnclipped).flow_total;
   EXPECT_GT(whole, 100.0);
-  EXPECT_NEAR(motion_of_points(reference, turn, 20.0).flow_total, whole, 1e-6);
+  EXPECT_NEAR(motion_of_points(points, turn, 20.0).flow_total, whole, 1e-6);
 }
 
 }  // namespace

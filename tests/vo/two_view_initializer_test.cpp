@@ -277,7 +277,7 @@ TEST(PatchTracker, FollowsAShiftOfSeveralPixelsWithAChangeOfContrast) {
     }
   }
   PatchTracker tracker;
-  tracker.set_first(*test::pyramid_of(image), camera, candidates);
+  tracker.set_first(test::pyramid_of(image), camera, candidates);
   ASSERT_GE(tracker.tracks().size(), 50U);
   const auto next = test::pyramid_of(shifted);
   tracker.track(*next, SO3(), SO3());

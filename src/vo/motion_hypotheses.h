@@ -1,0 +1,14 @@
+#pragma once
+
+#include <vector>
+
+#include "sovo/geometry/se3.h"
+
+namespace sovo {
+
+/// Motions to try when none is known: `around` itself, then translations along each axis in shares
+/// of the mean depth, and rotations by a few degrees, all from there. `mean_rho`: mean inverse
+/// depth [1/m].
+std::vector<SE3> unknown_motions(const SE3& around, double mean_rho);
+
+}  // namespace sovo

@@ -17,10 +17,11 @@ std::vector<std::string> preset_assignments(Preset preset) {
     return {"mode=stereo", "vo.points.immature_points=700", "vo.window.max_iterations=10"};
   }
   return {"vo.points.active_points=800", "vo.points.immature_points=250",
-          "vo.keyframe.max_keyframes=5", "vo.keyframe.min_keyframes=4"};
+          "vo.keyframe.max_keyframes=5", "vo.keyframe.min_keyframes=4",
+          "features.features=400",       "features.max_keyframes=8",
+          "features.free_keyframes=5"};
 }
 
-/// Weights of the odometry: a negative one would turn its term's meaning round.
 Result<void> check_backend(const StereoOdometryConfig& odometry) {
   const FeatureConfig& f = odometry.features;
   if (f.features < 50) return Error{"features.features must be at least 50"};
@@ -41,6 +42,7 @@ Result<void> check_backend(const StereoOdometryConfig& odometry) {
   return {};
 }
 
+/// Weights of the odometry: a negative one would turn its term's meaning round.
 Result<void> check_weights(const DirectConfig& vo) {
   const KeyframeConfig& keyframe = vo.keyframe;
   const WindowConfig& window = vo.window;
@@ -267,7 +269,10 @@ void add_sim_options(ConfigOptions& options) {
 }
 
 void add_odometry_options(ConfigOptions& options) {
-  options.value("--mode", "mode", "Who owns the metric scale", "mono|scale|stereo")
+  options
+      .value("--backend", "backend", "Which monocular odometry follows the left camera",
+             "direct|features")
+      .value("--mode", "mode", "Who owns the metric scale", "mono|scale|stereo")
       .value("--preset", "preset", "Values to begin with", "embedded|default|quality")
       .value("--init", "init", "How the map begins", "auto|stereo|two_view")
       .value("--depth-init", "depth_init", "A new point's first depth interval",

@@ -1,6 +1,7 @@
 #include "sovo/eval/relative_nees.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <vector>
 
@@ -11,6 +12,7 @@ namespace sovo {
 namespace {
 
 constexpr std::int64_t kStampTolerance = 1'000'000;  ///< [ns]
+constexpr int kRarely = 10;         ///< Of so many pairs one may claim what is no covariance.
 constexpr std::size_t kStride = 5;  ///< Poses between two starts: neighbours say the same.
 
 /// A pose with the true one of its stamp.
@@ -61,18 +63,25 @@ double relative_nees(std::span<const UncertainPose> poses, const Trajectory& tru
   const std::vector<KnownPose> known = known_poses(poses, truth);
   double sum = 0.0;
   int count = 0;
+  int indefinite = 0;
   for (std::size_t i = 0; i < known.size(); i += kStride) {
     for (std::size_t j = i + 1; j < known.size(); ++j) {
       if (known[j].claimed->segment != known[i].claimed->segment) break;
       const double seconds =
           1e-9 * static_cast<double>(known[j].claimed->stamp_ns - known[i].claimed->stamp_ns);
       if (seconds < distance.seconds || known[j].way - known[i].way < distance.metres) continue;
-      sum += pair_nees(known[i], known[j]);
-      ++count;
+      const double pair = pair_nees(known[i], known[j]);
+      if (std::isfinite(pair)) {
+        sum += pair;
+        ++count;
+      } else {
+        ++indefinite;
+      }
       break;
     }
   }
-  return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
+  const bool enough = count > 0 && kRarely * indefinite <= count;
+  return enough ? sum / count : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace sovo

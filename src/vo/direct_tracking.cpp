@@ -12,32 +12,6 @@ namespace {
 
 constexpr std::size_t kMotionsKept = 4;
 
-/// Steps to either side of a grid, of which the outermost is at `reach`, or nearer when that takes
-/// more than `most`.
-int steps_to(double reach, double step, int most) {
-  return std::clamp(static_cast<int>(std::ceil(reach / step)), 1, most);
-}
-
-/// Turns by up to `reach` around each axis [rad], dense enough for alignment on `level` to begin
-/// from one of them: a pixel of it apart.
-std::vector<SO3> turns(double reach, const CameraModel& level) {
-  constexpr int kMostSteps = 8;
-  constexpr int kMostRolls = 2;
-  const double pixel = 1.0 / level.fx;
-  const double roll = 3.0 / (0.5 * (level.width + level.height));
-  const int n = steps_to(reach, pixel, kMostSteps);
-  const int n_roll = steps_to(reach, roll, kMostRolls);
-  std::vector<SO3> out;
-  for (int x = -n; x <= n; ++x) {
-    for (int y = -n; y <= n; ++y) {
-      for (int z = -n_roll; z <= n_roll; ++z) {
-        out.push_back(SO3::exp(Vec3(x * pixel, y * pixel, z * roll)));
-      }
-    }
-  }
-  return out;
-}
-
 /// Motions to try when none of the likely ones fits: a camera that was knocked turns by another
 /// angle than before, while its way goes on, or not. After a gap it may have gone any part of it.
 std::vector<SE3> knocked_motions(const KnownMotion& known, const CameraModel& level) {
@@ -143,7 +117,7 @@ TrackedFrame DirectOdometry::track_hypotheses(const MonoFrame& frame,
   TrackedFrame out;
   out.frame = frame;
   const TrackingResult tracking = align(ref, frame);
-  out.tracking = tracking;
+  out.tracking = static_cast<const FrameTracking&>(tracking);
   out.reference = std::move(reference);
   if (!tracking.good) return out;
 

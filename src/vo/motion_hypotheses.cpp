@@ -1,6 +1,8 @@
 #include "sovo/vo/motion_hypotheses.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace sovo {
 
@@ -18,6 +20,12 @@ void add_rotations(const SE3& around, std::vector<SE3>* hypotheses) {
   }
 }
 
+/// Steps to either side of a grid, of which the outermost is at `reach`, or nearer when that takes
+/// more than `most`.
+int steps_to(double reach, double step, int most) {
+  return std::clamp(static_cast<int>(std::ceil(reach / step)), 1, most);
+}
+
 }  // namespace
 
 std::vector<SE3> unknown_motions(const SE3& around, double mean_rho) {
@@ -33,6 +41,24 @@ std::vector<SE3> unknown_motions(const SE3& around, double mean_rho) {
     }
   }
   add_rotations(around, &out);
+  return out;
+}
+
+std::vector<SO3> turns(double reach, const CameraModel& level) {
+  constexpr int kMostSteps = 8;
+  constexpr int kMostRolls = 2;
+  const double pixel = 1.0 / level.fx;
+  const double roll = 3.0 / (0.5 * (level.width + level.height));
+  const int n = steps_to(reach, pixel, kMostSteps);
+  const int n_roll = steps_to(reach, roll, kMostRolls);
+  std::vector<SO3> out;
+  for (int x = -n; x <= n; ++x) {
+    for (int y = -n; y <= n; ++y) {
+      for (int z = -n_roll; z <= n_roll; ++z) {
+        out.push_back(SO3::exp(Vec3(x * pixel, y * pixel, z * roll)));
+      }
+    }
+  }
   return out;
 }
 

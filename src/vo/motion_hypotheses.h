@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "sovo/geometry/camera_model.h"
 #include "sovo/geometry/se3.h"
 
 namespace sovo {
@@ -10,5 +11,9 @@ namespace sovo {
 /// of the mean depth, and rotations by a few degrees, all from there. `mean_rho`: mean inverse
 /// depth [1/m].
 std::vector<SE3> unknown_motions(const SE3& around, double mean_rho);
+
+/// Turns by up to `reach` around each axis [rad], dense enough for alignment on `level` to begin
+/// from one of them: a pixel of it apart.
+std::vector<SO3> turns(double reach, const CameraModel& level);
 
 }  // namespace sovo

@@ -5,9 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include "sovo/geometry/linear_solvers.h"
-#include "sovo/image/interpolation.h"
-
 namespace sovo {
 namespace {
 
@@ -74,8 +71,7 @@ void PatchTracker::track(const ImagePyramid& pyramid, const SO3& R_new_last,
   const PatchAlignmentConfig alignment{.levels = config_.coarsest_level + 1,
                                        .max_iterations = config_.max_iterations,
                                        .min_zncc = static_cast<float>(config_.min_zncc)};
-  for (std::size_t i = 0; i < tracks_.size(); ++i) {
-    PatchTrack& t = tracks_[i];
+  for (PatchTrack& t : tracks_) {
     t.followed = false;
     float u = 0.0F, v = 0.0F;
     PatchWarp warp;
@@ -94,55 +90,6 @@ void PatchTracker::track(const ImagePyramid& pyramid, const SO3& R_new_last,
   const auto middle = contrasts_.begin() + static_cast<std::ptrdiff_t>(contrasts_.size() / 2);
   std::nth_element(contrasts_.begin(), middle, contrasts_.end());
   gain_ = std::clamp(*middle, 0.2F, 5.0F);
-}
-
-double align_rotation(const ImageF& from, const ImageF& to, const CameraModel& camera,
-                      const SO3& start, SO3* R_to_from) {
-  using Vec5 = Eigen::Matrix<double, 5, 1>;
-  using Mat5 = Eigen::Matrix<double, 5, 5>;
-  constexpr int kIterations = 12;
-  constexpr double kHuber = 15.0;
-  SO3 R = start;
-  double a = 1.0, b = 0.0, rms = std::numeric_limits<double>::infinity();
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
-    const Mat3 r = R.matrix();
-    Mat5 H = Mat5::Zero();
-    Vec5 g = Vec5::Zero();
-    double energy = 0.0, weight_sum = 0.0;
-    int count = 0;
-    for (int y = 0; y < from.height(); ++y) {
-      for (int x = 0; x < from.width(); ++x) {
-        const Vec3 p = r * Vec3((x - camera.cx) / camera.fx, (y - camera.cy) / camera.fy, 1.0);
-        if (p.z() < 0.1) continue;
-        const double px = p.x() / p.z(), py = p.y() / p.z();
-        const float u = static_cast<float>(camera.fx * px + camera.cx);
-        const float v = static_cast<float>(camera.fy * py + camera.cy);
-        if (!in_image(to, u, v)) continue;
-        const Sample s = sample_with_gradient(to, u, v);
-        const double residual = s.value - a * from.at(x, y) - b;
-        const double w = std::min(1.0, kHuber / std::max(std::abs(residual), 1e-9));
-        const double gx = s.gx * camera.fx, gy = s.gy * camera.fy;
-        Vec5 J;
-        J << -gx * px * py - gy * (1.0 + py * py), gx * (1.0 + px * px) + gy * px * py,
-            -gx * py + gy * px, -from.at(x, y), -1.0;
-        H.selfadjointView<Eigen::Lower>().rankUpdate(J, w);
-        g += w * residual * J;
-        energy += w * residual * residual;
-        weight_sum += w;
-        ++count;
-      }
-    }
-    if (2 * count < from.width() * from.height()) return std::numeric_limits<double>::infinity();
-    rms = std::sqrt(energy / weight_sum);
-    *R_to_from = R;
-    H.diagonal() += Vec5::Constant(1e-6);
-    const Vec5 step = -solve_small(H, g);
-    R = SO3::exp(step.head<3>()) * R;
-    a += step[3];
-    b += step[4];
-    if (step.head<3>().norm() < 0.02 / camera.fx) break;
-  }
-  return rms;
 }
 
 }  // namespace sovo

@@ -71,10 +71,4 @@ class PatchTracker {
   std::vector<float> contrasts_;
 };
 
-/// Rotation between two frames (with gain and bias) from all pixels of one coarse level, by
-/// Gauss-Newton from `start`. Returns the root mean square residual [grey levels]; infinity when
-/// fewer than half of the pixels overlap.
-double align_rotation(const ImageF& from, const ImageF& to, const CameraModel& camera,
-                      const SO3& start, SO3* R_to_from);
-
 }  // namespace sovo

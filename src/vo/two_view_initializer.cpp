@@ -6,6 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "sovo/vo/image_rotation.h"
+
 namespace sovo {
 namespace {
 

@@ -76,6 +76,13 @@ class Robustness(SimTest):
             self.assertEqual(len(live), len(truth) - 5)
             self.assertLess(largest_error(live, truth, live[0][0]), error_m)
 
+    def test_features_follow_blows_and_gaps(self):
+        blows = self.trajectory(knocked, 6)
+        self.expect_whole(*self.fly("hall", *blows, "--backend", "features"), 0.05)
+        gaps = {"gap_s": 0.5, "gap_every_s": 1.5}
+        truth, live = self.fly("hall", "--frames", 100, "--backend", "features", **gaps)
+        self.expect_whole(truth, live, 0.06)
+
     def test_lamps_of_the_vehicle_light_the_dark(self):
         # With lighting: world 0.09 m off, and lost.
         for light in (("--reverse",), ("--set", "sim.lamps.beam_deg=45")):

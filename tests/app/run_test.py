@@ -63,6 +63,21 @@ class Accuracy(CommandTest):
         b = self.run_with("--deterministic", "--mode", "stereo", "--threads", 2)
         self.assertEqual(a, b)
 
+    def test_backend_features(self):
+        live = self.run_with("--backend", "features")
+        self.assertEqual(len(live), FRAMES)
+        self.assertLess(largest_error(live, read_tum(TRUTH), live[0][0]), TOLERANCE_M)
+        a, b = (self.run_with("--deterministic", "--backend", "features", "--threads", n)
+                for n in (1, 2))
+        self.assertEqual(a, b)
+        self.assertLess(largest_error(a, read_tum(TRUTH), a[0][0]), TOLERANCE_M)
+
+    def test_backend_features_finds_the_scale_of_two_views(self):
+        poses = self.run_with("--deterministic", "--backend", "features", "--init", "two_view")
+        # The dataset begins slowly: so much of it shows parallax enough, whatever the backend.
+        self.assertGreater(len(poses), 0.4 * FRAMES)
+        self.assertLess(largest_error(poses, read_tum(TRUTH), poses[0][0]), TOLERANCE_M)
+
     def test_reverse_writes_the_stamps_of_the_dataset(self):
         poses = self.run_with("--reverse", "--deterministic")
         stamps = [stamp for stamp, _, _ in poses]
@@ -217,6 +232,11 @@ class RecordedClips(CommandTest):
 
     def test_kitti(self):
         self.complete("kitti/sequences/06", "--frames", 30)
+
+    def test_by_features(self):
+        self.complete("euroc/MH_01_head", "--frames", 40, "--backend", "features")
+        self.complete("kitti/sequences/06", "--frames", 20, "--backend", "features",
+                      "--reverse")
 
 
 if __name__ == "__main__":

@@ -44,9 +44,19 @@ class Configuration(CommandTest):
                            "assist.few_points=0.9", "assist.good_keyframes=0",
                            "lighting=lamp", "local_contrast.radius=0", "local_contrast.floor=0",
                            "loops.place_step=0", "loops.keypoints.per_image=10",
-                           "loops.max_places=1", "loops.matching.sigma_px=0"]:
+                           "loops.max_places=1", "loops.matching.sigma_px=0",
+                           "backend=feature", "features.features=10", "features.levels=0",
+                           "features.max_keyframes=2", "features.free_keyframes=12",
+                           "features.sigma_px=0", "features.weak_corner=20"]:
             with self.subTest(assignment=assignment):
                 self.expect(sovo("--set", assignment, "config"), USAGE)
+
+    def test_features_have_no_mode_stereo_and_say_what_to_do(self):
+        for options in (("--set", "mode=stereo"), ("--preset", "quality")):
+            result = self.expect(sovo("config", "--set", "backend=features", *options), USAGE)
+            self.assertIn("use mode: scale", result.stderr)
+        self.expect(sovo("config", "--set", "backend=features", "--preset", "quality",
+                         "--set", "mode=scale"), OK)
 
     def test_dump_reads_back_as_the_same(self):
         first = self.expect(sovo("config", "--set", "seed=7"), OK).stdout

@@ -75,6 +75,14 @@ TEST_F(RelativeNees, TellsTooBoldClaimsFromTooTimidOnes) {
   EXPECT_NEAR(relative_nees(poses_, truth_, {.seconds = 1.0}), 0.25 * honest, 1e-6);
 }
 
+TEST_F(RelativeNees, AFewPosesThatClaimLessLaterAreLeftOutAndManyAreNot) {
+  const double honest = relative_nees(poses_, truth_, {.seconds = 1.0});
+  for (std::size_t i = 0; i < poses_.size(); i += 100) poses_[i].covariance *= 1e6;
+  EXPECT_NEAR(relative_nees(poses_, truth_, {.seconds = 1.0}), honest, 0.1);
+  for (std::size_t i = 0; i < poses_.size(); i += 15) poses_[i].covariance *= 1e6;
+  EXPECT_TRUE(std::isnan(relative_nees(poses_, truth_, {.seconds = 1.0})));
+}
+
 TEST_F(RelativeNees, ComparesNoPosesOfTwoSegmentsAndNoneWithoutTruth) {
   EXPECT_TRUE(std::isnan(relative_nees(poses_, truth_, {.metres = 60.0})));
   for (StampedPose& pose : truth_) pose.stamp_ns += kPeriodNs / 2;

@@ -206,6 +206,17 @@ TEST_P(Backend, SnapshotShowsTheTrueDepths) {
   EXPECT_LT(errors[errors.size() / 2], 0.03);
 }
 
+TEST_P(Backend, AnyTrackedFrameCanBeMadeAKeyframe) {
+  // The second one of a start from two views must be one.
+  TrackedFrame tracked = vo_->track_from(frame_at(scene_, drive(2), 2), drive(2).inverse());
+  ASSERT_TRUE(tracked.tracking.good);
+  tracked.wants_keyframe = true;
+  const MapResult result = vo_->map(tracked, {}, nullptr);
+  EXPECT_TRUE(result.is_keyframe);
+  EXPECT_FALSE(result.failed);
+  EXPECT_EQ(vo_->keyframes().size(), 2U);
+}
+
 TEST_P(Backend, AStaleFrameMakesNoKeyframe) {
   const TrackedFrame old = vo_->track(frame_at(scene_, drive(1), 1), 0.0);
   drive_to_keyframe(1, 2);

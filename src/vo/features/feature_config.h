@@ -9,11 +9,11 @@ struct FeatureConfig {
   double weak_corner = 0.5;        ///< As far as that sinks where there is little texture.
   int levels = 4;                  ///< Pyramid levels of a patch.
   int max_iterations = 10;         ///< Of its alignment, a level.
-  double min_zncc = 0.75;          ///< Least correlation of a followed patch with its first view.
+  double min_zncc = 0.6;           ///< Least correlation of a followed patch with its first view.
   double sigma_px = 0.3;           ///< Standard deviation of a followed position [px].
   double outlier_sigmas = 3.0;     ///< Residuals beyond are outliers.
   int min_inliers = 30;            ///< Lost with fewer features that agree,
-  double min_inlier_ratio = 0.3;   ///< or with a smaller share of those in view.
+  double min_inlier_ratio = 0.18;  ///< or with a smaller share of those in view.
   double sure_inlier_ratio = 0.6;  ///< With a smaller one other motions are tried.
   double min_followed = 0.6;       ///< Share of the features below which a keyframe is made.
   int max_keyframes = 12;          ///< In the window, the newest included.

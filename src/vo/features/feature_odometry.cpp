@@ -9,10 +9,6 @@
 
 #include "sovo/image/corners.h"
 #include "sovo/vo/features/reprojection.h"
-#include "sovo/vo/keyframe_policy.h"
-#include "sovo/vo/motion_hypotheses.h"
-#include "sovo/vo/patch_tracker.h"
-#include "sovo/vo/point_motion.h"
 #include "sovo/vo/stage_timer.h"
 
 namespace sovo {
@@ -188,98 +184,6 @@ void FeatureOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
   }
   history_.record(window_.poses());
   publish_reference();
-}
-
-TrackedFrame FeatureOdometry::track(const MonoFrame& frame, double max_acceleration) {
-  auto reference = tracking_reference();
-  const MotionModel::Forecast forecast =
-      motion_.forecast(*reference, frame.stamp_ns, max_acceleration);
-  return track_against(frame, std::move(reference), forecast);
-}
-
-TrackedFrame FeatureOdometry::track_from(const MonoFrame& frame, const SE3& T_current_reference) {
-  return track_against(frame, tracking_reference(), {T_current_reference, std::nullopt});
-}
-
-/// From the expected motion; when few features agree there, from one that turned as the whole image
-/// says, from rest and, where no motion is known, from the best of many.
-FeatureTracking FeatureOdometry::align(const FeatureReference& reference, const MonoFrame& frame,
-                                       const MotionModel::Forecast& forecast) const {
-  const SE3 expected = forecast.known ? forecast.known->expected : forecast.last;
-  FeatureTracking best = tracker_.track(reference, *frame.pyramid, expected,
-                                        forecast.known ? config_.levels - 1 : config_.levels);
-  const auto sure = [&](const FeatureTracking& t) {
-    return t.tracking.good && t.tracking.inlier_ratio >= config_.sure_inlier_ratio;
-  };
-  if (sure(best)) return best;
-  std::vector<SE3> others;
-  const int coarsest = std::min(frame.pyramid->num_levels(), last_pyramid_->num_levels()) - 1;
-  const SE3 expected_step = expected * forecast.last.inverse();
-  SO3 turn;
-  for (const SO3& start : {expected_step.rotation(), SO3()}) {
-    const double rms = align_rotation((*last_pyramid_)[coarsest], (*frame.pyramid)[coarsest],
-                                      camera_.at_level(coarsest), start, &turn);
-    if (!std::isfinite(rms)) continue;
-    others.push_back(
-        SE3(turn, turn * (expected_step.rotation().inverse() * expected_step.translation())) *
-        forecast.last);
-  }
-  others.push_back(forecast.last);
-  if (!forecast.known) {
-    others.push_back(tracker_.best_of(reference, *frame.pyramid,
-                                      unknown_motions(forecast.last, reference.mean_rho)));
-  }
-  for (const SE3& other : others) {
-    FeatureTracking t = tracker_.track(reference, *frame.pyramid, other, config_.levels);
-    if (t.tracking.inliers > best.tracking.inliers) best = std::move(t);
-    if (sure(best)) break;
-  }
-  return best;
-}
-
-TrackedFrame FeatureOdometry::track_against(const MonoFrame& frame,
-                                            std::shared_ptr<const FeatureReference> reference,
-                                            const MotionModel::Forecast& forecast) {
-  TrackedFrame out;
-  out.frame = frame;
-  FeatureTracking tracked = align(*reference, frame, forecast);
-  out.tracking = tracked.tracking;
-  if (out.tracking.good && forecast.known &&
-      !is_reachable(*forecast.known, out.tracking.T_current_reference)) {
-    out.tracking.good = false;
-    out.tracking.out_of_reach = true;
-  }
-  out.reference = reference;
-  if (!out.tracking.good) return out;
-  out.covariance = tracked.covariance;
-  out.T_world_camera = reference->T_world_camera * out.tracking.T_current_reference.inverse();
-  out.wants_keyframe = wants_keyframe(*reference, tracked);
-  if (out.wants_keyframe) {
-    tracker_.find_unseen(*reference, *frame.pyramid, &tracked);
-    out.views = std::move(tracked.views);
-  }
-  motion_.note(*reference, out.tracking.T_current_reference, frame.stamp_ns);
-  last_pyramid_ = frame.pyramid;
-  return out;
-}
-
-bool FeatureOdometry::wants_keyframe(const FeatureReference& reference,
-                                     const FeatureTracking& tracked) const {
-  ReferenceLevel points;
-  points.camera = camera_;
-  for (const ReferenceFeature& f : reference.features) {
-    if (!f.has_depth) continue;
-    Reprojection p;
-    if (!reproject(camera_, f.T_reference_host, f.ray, f.rho, &p)) continue;
-    points.u.push_back(static_cast<float>(p.pixel.x()));
-    points.v.push_back(static_cast<float>(p.pixel.y()));
-    points.rho.push_back(static_cast<float>(f.rho * p.depth_ratio));
-  }
-  const double clip = keyframe_config_.max_translation_flow * pixels_for_one_of_vga(camera_);
-  const PointMotion motion = motion_of_points(points, tracked.tracking.T_current_reference, clip);
-  const double score = motion_score(keyframe_config_, camera_, motion);
-  return score > 1.0 ||
-         (tracked.followed < config_.min_followed && score > keyframe_config_.rmse_min_score);
 }
 
 MapResult FeatureOdometry::map(const TrackedFrame& tracked, const KeyframeStereo& stereo,

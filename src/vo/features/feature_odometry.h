@@ -54,6 +54,8 @@ class FeatureOdometry final : public MonocularBackend {
                              const MotionModel::Forecast& forecast);
   FeatureTracking align(const FeatureReference& reference, const MonoFrame& frame,
                         const MotionModel::Forecast& forecast) const;
+  std::vector<SE3> turned_motions(const MonoFrame& frame,
+                                  const MotionModel::Forecast& forecast) const;
   bool wants_keyframe(const FeatureReference& reference, const FeatureTracking& tracked) const;
 
   void insert_keyframe(const TrackedFrame& tracked, const SE3& T_world_camera);

@@ -27,9 +27,9 @@ struct PairDistance {
 };
 
 /// Mean of e^T C^-1 e / 6 over all pairs, e being the error of a relative pose: 1 when honest,
-/// above when optimistic. A pair whose covariances do not differ by a positive definite matrix is left
-/// out: what a scale that is hardly known adds to a pose near the start need not be in later ones.
-/// NaN when there is no pair, or when more than one in ten is so.
+/// above when optimistic. A pair whose covariances do not differ by a positive definite matrix is
+/// left out: what a scale that is hardly known adds to a pose near the start need not be in later
+/// ones. NaN when there is no pair, or when more than one in ten is so.
 double relative_nees(std::span<const UncertainPose> poses, const Trajectory& truth,
                      const PairDistance& distance);
 

@@ -22,7 +22,7 @@ void WorkerPool::drain() {
 }
 
 void WorkerPool::run_function(int n, const std::function<void(int)>& job) {
-  if (workers_.empty() || n < 2) {
+  if (workers_.empty() || n < 2 || occupied_.test_and_set(std::memory_order_acquire)) {
     for (int i = 0; i < n; ++i) job(i);
     return;
   }
@@ -36,8 +36,11 @@ void WorkerPool::run_function(int n, const std::function<void(int)>& job) {
   }
   start_.notify_all();
   drain();
-  std::unique_lock lock(mutex_);
-  done_.wait(lock, [this] { return busy_ == 0; });
+  {
+    std::unique_lock lock(mutex_);
+    done_.wait(lock, [this] { return busy_ == 0; });
+  }
+  occupied_.clear(std::memory_order_release);
 }
 
 void WorkerPool::work() {

@@ -24,8 +24,8 @@ class WorkerPool {
 
   int threads() const { return static_cast<int>(workers_.size()) + 1; }
 
-  /// Runs job(0) ... job(n - 1) and returns when all are done. One caller at a time. Allocates no
-  /// memory, whatever the job holds.
+  /// Runs job(0) ... job(n - 1) and returns when all are done. While one caller's loop runs,
+  /// another caller runs its own alone. Allocates no memory, whatever the job holds.
   template <class Job>
   void run(int n, const Job& job) {
     run_function(n, std::cref(job));
@@ -36,6 +36,7 @@ class WorkerPool {
   void work();
   void drain();
 
+  std::atomic_flag occupied_;  ///< By a caller's loop.
   std::mutex mutex_;
   std::condition_variable start_;
   std::condition_variable done_;

@@ -229,4 +229,17 @@ inline std::vector<TrajectoryPose> published(const Recorder& recorder) {
   return out;
 }
 
+inline constexpr int kDriveFrames = 24;
+
+inline void expect_follows_the_drive(const std::vector<TrajectoryPose>& trajectory, double rms,
+                                     double scale) {
+  ASSERT_GT(trajectory.size(), 2U);
+  for (std::size_t i = 1; i < trajectory.size(); ++i) {
+    ASSERT_GT(trajectory[i].stamp_ns, trajectory[i - 1].stamp_ns);
+  }
+  const DriveError error = drive_error(trajectory);
+  EXPECT_LT(error.rms, rms);
+  EXPECT_NEAR(error.scale, 1.0, scale);
+}
+
 }  // namespace sovo::test

@@ -12,19 +12,6 @@ namespace {
 
 using namespace test;
 
-constexpr int kDriveFrames = 24;
-
-void expect_follows_the_drive(const std::vector<TrajectoryPose>& trajectory, double rms,
-                              double scale) {
-  ASSERT_GT(trajectory.size(), 2U);
-  for (std::size_t i = 1; i < trajectory.size(); ++i) {
-    ASSERT_GT(trajectory[i].stamp_ns, trajectory[i - 1].stamp_ns);
-  }
-  const DriveError error = drive_error(trajectory);
-  EXPECT_LT(error.rms, rms);
-  EXPECT_NEAR(error.scale, 1.0, scale);
-}
-
 TEST(StereoOdometry, FollowsADriveInMetres) {
   Playback run(test_config());
   run.give_drive(0, kDriveFrames);
@@ -163,23 +150,6 @@ TEST(StereoOdometry, RepeatedRunIsTheSameToTheLastBitWithOneThreadOrTwo) {
       EXPECT_EQ(bits_of_a.value(), bits_of_b.value()) << "pose " << i;
     }
   }
-}
-
-TEST(StereoOdometry, LiveThreadsFollowTheDriveToo) {
-  StereoOdometryConfig config = test_config();
-  config.deterministic = false;
-  config.threads = 2;
-  config.wait_for_mapping = true;
-  Playback run(config);
-  run.give_drive(0, kDriveFrames);
-  run.odometry.finish();
-  EXPECT_EQ(run.recorder.frames.back().dropped_queue, 0U);
-  expect_follows_the_drive(published(run.recorder), 0.02, 0.04);
-  EXPECT_EQ(run.odometry.refined_trajectory().size(), static_cast<std::size_t>(kDriveFrames));
-  expect_follows_the_drive(run.odometry.refined_trajectory(), 0.02, 0.04);
-  EXPECT_GE(run.recorder.keyframes.size(), 3U);
-  // A scale job that is overtaken by the next keyframe is left out.
-  EXPECT_GE(run.recorder.scales.size(), 1U);
 }
 
 TEST(StereoOdometry, MonoModeClaimsNoScale) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <numeric>
+#include <thread>
 
 namespace sovo {
 namespace {
@@ -42,6 +43,25 @@ TEST(WorkerPool, ResultsOfOneLoopAreSeenByTheNext) {
     });
     EXPECT_EQ(neighbour, std::vector<int>(1000, round));
   }
+}
+
+TEST(WorkerPool, TwoCallersAtOnceEachGetTheirOwnLoop) {
+  // Tracking and mapping are threads of their own, and share the pool.
+  WorkerPool pool(3);
+  const auto many_loops = [&](int size, int* wrong) {
+    for (int round = 0; round < 300; ++round) {
+      std::vector<int> calls(static_cast<std::size_t>(size), 0);
+      pool.run(size, [&](int i) { ++calls[static_cast<std::size_t>(i)]; });
+      *wrong += calls == std::vector<int>(static_cast<std::size_t>(size), 1) ? 0 : 1;
+    }
+  };
+  int wrong_here = 0;
+  int wrong_there = 0;
+  std::thread other([&] { many_loops(37, &wrong_there); });
+  many_loops(23, &wrong_here);
+  other.join();
+  EXPECT_EQ(wrong_here, 0);
+  EXPECT_EQ(wrong_there, 0);
 }
 
 TEST(WorkerPool, EndsWithoutEverHavingRun) { const WorkerPool pool(4); }

@@ -39,8 +39,8 @@ std::string status_screen(const bridge::msg::VoStatus& s, const std::string& sur
                       s.lost_transport, s.dropped_queue, s.rejected);
   text += fmt::format("map         segment {}, {} keyframes, {} points, {} inliers\n", s.segment,
                       s.keyframes, s.points, s.inliers);
-  text += fmt::format("tracking    residual {:.2f} grey levels, pair error {:.3f} ms\n", s.residual,
-                      1e3 * s.sync_error_s);
+  text += fmt::format("tracking    residual {:.2f} grey levels (by features: px), ", s.residual);
+  text += fmt::format("pair error {:.3f} ms\n", 1e3 * s.sync_error_s);
   text += fmt::format("distance    {:.2f} m, {} resets\n", s.distance_m, s.reset_counter);
   text +=
       fmt::format("command     {} {}\n", s.last_command_id, text_or_dash(s.last_command_result));

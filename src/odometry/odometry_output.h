@@ -83,7 +83,7 @@ struct OdometryOutput {
   std::uint32_t keyframes = 0;  ///< In the window.
   std::uint32_t queue_depth = 0;
   double sync_error_s = 0.0;
-  double residual = 0.0;  ///< RMS of tracking [grey levels].
+  double residual = 0.0;  ///< RMS of tracking [grey levels; px where features are followed].
   double distance_m = 0.0;
 };
 

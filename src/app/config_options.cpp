@@ -31,6 +31,11 @@ Result<void> check_backend(const StereoOdometryConfig& odometry) {
     return Error{"features.free_keyframes must be at least 1 and less than features.max_keyframes"};
   }
   if (!(f.sigma_px > 0.0)) return Error{"features.sigma_px must be positive"};
+  if (!(f.outlier_sigmas > 0.0)) return Error{"features.outlier_sigmas must be positive"};
+  if (!(f.depth_damping >= 0.0)) return Error{"features.depth_damping must not be negative"};
+  if (f.max_iterations < 1 || f.max_iterations_window < 1) {
+    return Error{"features.max_iterations and max_iterations_window must be at least 1"};
+  }
   if (!(f.min_corner >= f.weak_corner && f.weak_corner > 0.0)) {
     return Error{"features.weak_corner must be positive and at most features.min_corner"};
   }

@@ -47,7 +47,9 @@ class Configuration(CommandTest):
                            "loops.max_places=1", "loops.matching.sigma_px=0",
                            "backend=feature", "features.features=10", "features.levels=0",
                            "features.max_keyframes=2", "features.free_keyframes=12",
-                           "features.sigma_px=0", "features.weak_corner=20"]:
+                           "features.sigma_px=0", "features.weak_corner=20",
+                           "features.outlier_sigmas=nan", "features.depth_damping=-1",
+                           "features.max_iterations=0", "features.max_iterations_window=0"]:
             with self.subTest(assignment=assignment):
                 self.expect(sovo("--set", assignment, "config"), USAGE)
 

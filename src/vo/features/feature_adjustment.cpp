@@ -245,7 +245,8 @@ BundleResult FeatureAdjuster::optimize(FeatureWindow* window) {
     VecX depths(coupled.size());
     for (Eigen::Index k = 0; k < coupled.size(); ++k) {
       const auto l = static_cast<std::size_t>(k);
-      depths[k] = (s.b_rho[l] - coupled[k]) / (s.H_rho[l] + s.damping[l]);
+      const double h = s.H_rho[l] + s.damping[l];
+      depths[k] = h > 0.0 ? (s.b_rho[l] - coupled[k]) / h : 0.0;  // what nothing tells of stays
     }
     result.finite = frames.allFinite() && depths.allFinite();
     if (!result.finite) return result;

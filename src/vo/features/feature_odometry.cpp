@@ -1,9 +1,7 @@
 #include "sovo/vo/features/feature_odometry.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <utility>
 

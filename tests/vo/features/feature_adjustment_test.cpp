@@ -136,6 +136,19 @@ TEST(FeatureAdjuster, WhatNoParallaxShowsStaysAsItIs) {
   EXPECT_NEAR(sum / static_cast<double>(before.size()), 0.0, 1e-3);
 }
 
+TEST(FeatureAdjuster, ALandmarkThatNothingTellsOfStaysAndBreaksNothing) {
+  FeatureConfig config;
+  config.depth_damping = 0.0;
+  FeatureAdjuster adjuster(config);
+  FeatureWindow window = true_window(5, 100, 0.2, 10);
+  Landmark unseen = window.landmarks.front();
+  unseen.observations.clear();
+  window.landmarks.push_back(unseen);
+  EXPECT_TRUE(adjuster.optimize(&window).finite);
+  EXPECT_EQ(window.landmarks.back().rho, unseen.rho);
+  EXPECT_LT(worst_pose_error(window), 5e-3);
+}
+
 TEST(FeatureAdjuster, CovarianceOfTheNewestKeyframeIsHonest) {
   FeatureConfig config;
   config.free_keyframes = 3;

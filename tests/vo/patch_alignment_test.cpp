@@ -60,6 +60,8 @@ TEST_P(FindPatch, FindsItsPlaceUnderScaleTurnAndLight) {
     EXPECT_LT((Vec2(match.u, match.v) - to).norm(), 0.05 * std::max(1.0, GetParam().scale));
     EXPECT_GT(match.zncc, 0.98F);
     EXPECT_NEAR(match.contrast, 0.7, 0.05);
+    EXPECT_EQ(match.finest_level, GetParam().scale > 1.5 ? 1 : 0)
+        << "pixels as large as the first's";
   }
 }
 

@@ -30,7 +30,7 @@ StereoFrame StereoPairing::make_frame(Image left, std::optional<Image> right) co
   if (right) {
     frame.right = std::move(right->side);
     frame.right.stamp_offset_ns = right->stamp_ns - frame.stamp_ns;
-    frame.pair_error_s = 1e-9 * static_cast<double>(frame.right.stamp_offset_ns);
+    frame.pair_error_s = 1e-9 * std::abs(static_cast<double>(frame.right.stamp_offset_ns));
   }
   return frame;
 }

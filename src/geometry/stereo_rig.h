@@ -27,6 +27,14 @@ struct StereoRig {
 
   /// Distance between the two optical centres [m].
   double baseline() const { return T_right_left.translation().norm(); }
+
+  /// The rig as a right image sees it that was exposed at another instant than the left one:
+  /// `T_later_left` maps the left camera at its own instant into where it was at the right one's.
+  StereoRig moved(const SE3& T_later_left) const {
+    StereoRig out = *this;
+    out.T_right_left = T_right_left * T_later_left;
+    return out;
+  }
 };
 
 }  // namespace sovo

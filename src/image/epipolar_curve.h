@@ -51,14 +51,15 @@ class EpipolarCurve {
 };
 
 /// Where a pixel of the left image, a pinhole's, may lie in the right one: X_right = R m + rho t,
-/// where rho is 1 / z in the left frame.
-inline EpipolarCurve right_curve(const StereoRig& rig, const Vec2& pixel) {
-  const Mat3 r = rig.T_right_left.rotation_matrix();
+/// where rho is 1 / z in the left frame. `T_right_left`: that of the rig, or between the instants
+/// at which the two images were exposed (StereoRig::moved).
+inline EpipolarCurve right_curve(const StereoRig& rig, const SE3& T_right_left, const Vec2& pixel) {
+  const Mat3 r = T_right_left.rotation_matrix();
   const Vec3 m((pixel.x() - rig.left.cx) / rig.left.fx, (pixel.y() - rig.left.cy) / rig.left.fy,
                1.0);
   EpipolarCurve::Mat32 d_infinity;
   d_infinity << r.col(0) / rig.left.fx, r.col(1) / rig.left.fy;
-  return {rig.right, r * m, rig.T_right_left.translation(), d_infinity};
+  return {rig.right, r * m, T_right_left.translation(), d_infinity};
 }
 
 /// Pixel of level 0 in the coordinates of pyramid level `level`.

@@ -215,7 +215,7 @@ StaticMatch StaticMatcher::match(const ImagePyramid& left, const ImagePyramid& r
                                  float v, const MatchRequest& request) const {
   StaticMatch out;
   const Vec2 pixel(u, v);
-  const PatchSearch search{&left, &right, pixel, right_curve(rig_, pixel)};
+  const PatchSearch search{&left, &right, pixel, right_curve(rig_, rig_.T_right_left, pixel)};
   const auto [least, greatest] = request.inverse_depth_range.value_or(whole_range());
   Range range{static_cast<double>(least), static_cast<double>(greatest)};
   const bool clamp = range.min >= 0.0;

@@ -68,6 +68,9 @@ class StaticMatcher {
  public:
   StaticMatcher(const StaticMatcherConfig& config, const StereoRig& rig);
 
+  /// The same for a right image of another instant (StereoRig::moved).
+  StaticMatcher moved(const SE3& T_later_left) const { return {config_, rig_.moved(T_later_left)}; }
+
   /// Inverse depths that are searched where the request tells none: least, greatest [1/m].
   std::pair<float, float> whole_range() const;
 

@@ -110,10 +110,11 @@ LoopCloser::Node LoopCloser::make_node(const KeyframeOutput& keyframe) {
   const double rho = median_of(keyframe.inverse_depth);
   place.median_depth = rho > 0.0 ? 1.0 / rho : 1.0;
   const auto& [matcher, mask] = resolution(keyframe.halvings);
+  const StaticMatcher at_exposures = matcher.moved(keyframe.T_later_left);
   for (const Keypoint& keypoint : detect_keypoints(*keyframe.left, mask, config_.keypoints)) {
     Landmark landmark{.keypoint = in_whole_image(keypoint, keyframe.halvings)};
     const StaticMatch match =
-        matcher.match(*keyframe.left, *keyframe.right, keypoint.u, keypoint.v);
+        at_exposures.match(*keyframe.left, *keyframe.right, keypoint.u, keypoint.v);
     if (match.state == MatchState::kMatched && match.inverse_depth > 2.0F * match.sigma) {
       landmark.inverse_depth = match.inverse_depth;
       landmark.sigma = match.sigma;

@@ -132,7 +132,8 @@ bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage&
   const std::vector<SelectedPixel> pixels = vo_->select_pixels(frame, vo_->wanted_points());
   const auto right_pyramid =
       std::make_shared<const ImagePyramid>(preparation_.prepare_right(right, halvings_));
-  const std::vector<StaticMatch> matches = match_all(*frame.pyramid, *right_pyramid, pixels);
+  const std::vector<StaticMatch> matches =
+      match_all(matcher_, *frame.pyramid, *right_pyramid, pixels);
   std::vector<StartPoint> points(pixels.size());
   std::size_t good = 0;
   std::size_t in_view = 0;
@@ -230,7 +231,8 @@ std::optional<MappingOutcome> MapSegment::take_start_outcome() {
   return std::exchange(start_outcome_, std::nullopt);
 }
 
-std::vector<StaticMatch> MapSegment::match_all(const ImagePyramid& left, const ImagePyramid& right,
+std::vector<StaticMatch> MapSegment::match_all(const StaticMatcher& matcher,
+                                               const ImagePyramid& left, const ImagePyramid& right,
                                                const std::vector<SelectedPixel>& pixels) const {
   const ScopedStage stage(observer_, Stage::kStaticMatching);
   std::vector<StaticMatch> matches(pixels.size());
@@ -242,7 +244,7 @@ std::vector<StaticMatch> MapSegment::match_all(const ImagePyramid& left, const I
         const SelectedPixel& pixel = pixels[which[i]];
         MatchRequest request = common;
         request.gradient_share = pixel.threshold_share;
-        matches[which[i]] = matcher_.match(left, right, pixel.x, pixel.y, request);
+        matches[which[i]] = matcher.match(left, right, pixel.x, pixel.y, request);
       }
     });
   };
@@ -254,15 +256,15 @@ std::vector<StaticMatch> MapSegment::match_all(const ImagePyramid& left, const I
   }
   match_some(scouts, {});
   match_some(others,
-             {.inverse_depth_range = range_of_scouts(matches, scouts, matcher_.whole_range())});
+             {.inverse_depth_range = range_of_scouts(matches, scouts, matcher.whole_range())});
   return matches;
 }
 
-DepthProposer MapSegment::stereo_proposer(const ImagePyramidPtr& left,
-                                          const ImagePyramid& right) const {
-  return [this, left, &right](const std::vector<SelectedPixel>& pixels,
-                              std::vector<DepthProposal>* proposals) {
-    const std::vector<StaticMatch> matches = match_all(*left, right, pixels);
+DepthProposer MapSegment::stereo_proposer(const ImagePyramidPtr& left, const ImagePyramid& right,
+                                          const SE3& T_later_left) const {
+  return [this, left, &right, matcher = matcher_.moved(T_later_left)](
+             const std::vector<SelectedPixel>& pixels, std::vector<DepthProposal>* proposals) {
+    const std::vector<StaticMatch> matches = match_all(matcher, *left, right, pixels);
     std::transform(matches.begin(), matches.end(), proposals->begin(), proposal_of);
   };
 }
@@ -285,15 +287,19 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
   ScaleJob job;
   KeyframeStereo keyframe_stereo;
   const bool use_right = tracked.wants_keyframe && right != nullptr;
+  exposure_motion_.note(*tracked.reference, tracked.tracking.T_current_reference,
+                        tracked.frame.stamp_ns);
   if (use_right) {
+    job.T_later_left = exposure_motion_.until(right->stamp_offset_ns);
     const auto start = std::chrono::steady_clock::now();
     job.right = std::make_shared<const ImagePyramid>(preparation_.prepare_right(*right, halvings_));
     job.pyramid_seconds = seconds_since(start);
     // Depths of an unscaled map are no metres.
     const bool metric = filter_.locked();
     if (metric && matches_new_pixels()) {
-      keyframe_stereo.depths = stereo_proposer(tracked.frame.pyramid, *job.right);
+      keyframe_stereo.depths = stereo_proposer(tracked.frame.pyramid, *job.right, job.T_later_left);
     }
+    keyframe_stereo.T_later_left = job.T_later_left;
     if (stereo() && metric) keyframe_stereo.right = job.right;
   }
   out.map = vo_->map(tracked, keyframe_stereo, timer);
@@ -306,7 +312,7 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
     observer_->on_window(static_cast<std::uint32_t>(out.map.bundle.points),
                          static_cast<std::uint32_t>(out.map.bundle.residuals));
   }
-  out.keyframes = {new_keyframe(job.right)};
+  out.keyframes = {new_keyframe(job)};
   revise_left(std::exchange(out.map.left, {}), &out.keyframes);
   if (use_right && config_.mode != OdometryMode::kMono && vo_->snapshot()) {
     job.snapshot = *vo_->snapshot();
@@ -318,7 +324,8 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
 
 ScaleEstimate MapSegment::estimate_scale(const ScaleJob& job) const {
   const auto start = std::chrono::steady_clock::now();
-  const ScaleEstimate estimate = optimizer_.estimate(job.snapshot, *job.right, job.cold_start);
+  const ScaleEstimate estimate =
+      optimizer_.estimate(job.snapshot, *job.right, job.cold_start, job.T_later_left);
   if (observer_ != nullptr) {
     observer_->on_stage(Stage::kScaleOptimization, job.pyramid_seconds + seconds_since(start));
   }
@@ -417,7 +424,7 @@ KeyframeOutput MapSegment::first_keyframe(const MonoFrame& frame,
   return out;
 }
 
-KeyframeOutput MapSegment::new_keyframe(const ImagePyramidPtr& right) const {
+KeyframeOutput MapSegment::new_keyframe(const ScaleJob& job) const {
   const KeyframeSnapshot& s = *vo_->snapshot();
   KeyframeOutput out;
   out.id = s.id;
@@ -431,7 +438,8 @@ KeyframeOutput MapSegment::new_keyframe(const ImagePyramidPtr& right) const {
   out.covariance.topLeftCorner<3, 3>() +=
       scale_status().position_covariance(out.T_odom_left.translation());
   out.left = s.pyramid;
-  out.right = right;
+  out.right = job.right;
+  out.T_later_left = job.T_later_left;
   out.halvings = halvings_;
   return out;
 }

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "sovo/image/static_matcher.h"
+#include "sovo/odometry/exposure_motion.h"
 #include "sovo/odometry/frame_preparation.h"
 #include "sovo/odometry/odometry_output.h"
 #include "sovo/odometry/stereo_odometry.h"
@@ -40,6 +41,7 @@ struct ScaleStatus {
 struct ScaleJob {
   KeyframeSnapshot snapshot;
   ImagePyramidPtr right;
+  SE3 T_later_left;              ///< The left camera into where it was when `right` was exposed.
   double pyramid_seconds = 0.0;  ///< What the right pyramid cost.
   bool cold_start = false;
 };
@@ -108,9 +110,11 @@ class MapSegment {
  private:
   bool initialize_from_two_views(const MonoFrame& frame, const SideImage* right);
   bool finish_two_views(const MonoFrame& frame, const SideImage* right);
-  std::vector<StaticMatch> match_all(const ImagePyramid& left, const ImagePyramid& right,
+  std::vector<StaticMatch> match_all(const StaticMatcher& matcher, const ImagePyramid& left,
+                                     const ImagePyramid& right,
                                      const std::vector<SelectedPixel>& pixels) const;
-  DepthProposer stereo_proposer(const ImagePyramidPtr& left, const ImagePyramid& right) const;
+  DepthProposer stereo_proposer(const ImagePyramidPtr& left, const ImagePyramid& right,
+                                const SE3& T_later_left) const;
   const StereoRig& rig() const { return preparation_.rig(halvings_); }
   bool metric() const { return filter_.locked() && config_.mode != OdometryMode::kMono; }
   /// Whether new pixels get their depths from the right image.
@@ -118,7 +122,7 @@ class MapSegment {
   /// Whether static residuals own the scale, not similarities.
   bool stereo() const { return config_.mode == OdometryMode::kStereo; }
   KeyframeOutput first_keyframe(const MonoFrame& frame, const ImagePyramidPtr& right) const;
-  KeyframeOutput new_keyframe(const ImagePyramidPtr& right) const;
+  KeyframeOutput new_keyframe(const ScaleJob& job) const;
   KeyframeOutput own_points(const KeyframeState& state) const;
   void revise(const SE3& T_odom_left, KeyframeOutput* keyframe) const;
   void revise_left(const std::vector<KeyframeState>& left, std::vector<KeyframeOutput>* out);
@@ -135,6 +139,7 @@ class MapSegment {
 
   std::unique_ptr<MonocularBackend> vo_;
   StaticMatcher matcher_;
+  ExposureMotion exposure_motion_;
   ScaleOptimizer optimizer_;
   ScaleFilter filter_;
   StereoAssist assist_;

@@ -115,6 +115,7 @@ struct KeyframeOutput {
   Mat6 covariance = Mat6::Zero();  ///< Of T_odom_left, as in OdometryOutput.
   ImagePyramidPtr left;            ///< Its undistorted image.
   ImagePyramidPtr right;           ///< The raw one that was taken with it; null: there was none.
+  SE3 T_later_left;                ///< `left`'s camera into where it was when `right` was exposed.
   int halvings = 0;                ///< How often both were halved, unlike `u` and `v`.
 };
 

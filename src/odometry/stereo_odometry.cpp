@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
+#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <utility>
@@ -63,7 +64,9 @@ class StereoOdometry::Impl {
     }
     last_stamp_ns_ = frame.stamp_ns;
     const std::string right_problem = preparation_.check_side(frame.right, false);
-    const SideImage* right = right_problem.empty() ? &frame.right : nullptr;
+    SideImage right_side = frame.right;
+    right_side.stamp_offset_ns = exposure_offset(frame);
+    const SideImage* right = right_problem.empty() ? &right_side : nullptr;
     const MonoFrame left = preparation_.prepare_left(frame, observer_, segment_->halvings());
     if (segment_->initialized()) {
       follow(left, right, right_problem, &out);
@@ -96,6 +99,16 @@ class StereoOdometry::Impl {
   const ImageU8& tracked_mask() const { return preparation_.left_mask(); }
 
  private:
+  /// Of the right image to the left one [ns]; what stamps of cameras that are triggered together
+  /// err by is none.
+  std::int64_t exposure_offset(const StereoFrame& frame) const {
+    constexpr double kSigmas = 3.0;
+    const std::int64_t offset = frame.right.stamp_offset_ns - frame.left.stamp_offset_ns;
+    const double error = kSigmas * std::numbers::sqrt2 * frame.stamp_sigma_s;
+    const bool real = std::abs(kNanosecond * static_cast<double>(offset)) > error;
+    return config_.exposure_motion && real ? offset : 0;
+  }
+
   std::string refuse(const StereoFrame& frame) const {
     if (last_stamp_ns_ && frame.stamp_ns <= *last_stamp_ns_) {
       return frame.stamp_ns == *last_stamp_ns_ ? "the frame's stamp repeats the last one"

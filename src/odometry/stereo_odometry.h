@@ -93,6 +93,7 @@ struct StereoOdometryConfig {
   bool wait_for_mapping = false;  ///< Live: wait instead of dropping.
   int lost_frames = 5;  ///< Frames in a row without a pose after which a new segment begins.
   double max_acceleration = 100.0;  ///< A pose that takes more is none [m/s^2]; 0: any is taken.
+  bool exposure_motion = true;      ///< The motion between a pair's exposures is undone.
   double scale_timeout_s = 3.0;     ///< Without an accepted scale: state SCALE_UNOBSERVED.
   DirectConfig vo;
   FeatureConfig features;
@@ -123,6 +124,8 @@ struct StereoOdometryConfig {
     v("lost_frames", lost_frames, "frames in a row without a pose that begin a new segment");
     v("max_acceleration", max_acceleration,
       "a pose that takes more since the frames before is none [m/s^2]; 0: no limit");
+    v("exposure_motion", exposure_motion,
+      "cameras that are not triggered together: the motion between the exposures is undone");
     v("scale_timeout_s", scale_timeout_s, "without an accepted scale: SCALE_UNOBSERVED [s]");
     v("vo", vo, "direct monocular odometry");
     v("features", features, "feature-based monocular odometry");

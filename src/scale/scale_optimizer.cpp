@@ -144,13 +144,13 @@ ScaleOptimizer::ScaleOptimizer(ScaleOptimizer&& other) noexcept = default;
 ScaleOptimizer& ScaleOptimizer::operator=(ScaleOptimizer&& other) noexcept = default;
 
 ScaleEstimate ScaleOptimizer::estimate(const KeyframeSnapshot& keyframe, const ImagePyramid& right,
-                                       bool cold_start) const {
+                                       bool cold_start, const SE3& T_later_left) const {
   ScaleEstimate out;
   if (right.num_levels() == 0) {
     out.verdict = ScaleVerdict::kNoRightImage;
     return out;
   }
-  workspace_->points.prepare(keyframe, rig_, config_.min_relative_sigma);
+  workspace_->points.prepare(keyframe, rig_, T_later_left, config_.min_relative_sigma);
   if (workspace_->points.size < config_.min_points || keyframe.pyramid == nullptr) return out;
   if (rig_.baseline() < kMinBaseline) {
     out.verdict = ScaleVerdict::kUnobservable;

@@ -130,9 +130,11 @@ class ScaleOptimizer {
   /// Estimates the log-scale. `cold_start`: search all of the configured range first, else start
   /// from log-scale 0. `right`: raw right image, photometrically corrected. Both pyramids' level 0
   /// must have the size that their camera says. Where the verdict is kAccepted or kAmbiguous the
-  /// estimate is a number with a sigma; else it must not be used.
+  /// estimate is a number with a sigma; else it must not be used. `T_later_left`: the left camera
+  /// at the keyframe's instant into where it was when `right` was exposed, in the keyframe's unit
+  /// of length; the identity when both were exposed together.
   ScaleEstimate estimate(const KeyframeSnapshot& keyframe, const ImagePyramid& right,
-                         bool cold_start) const;
+                         bool cold_start, const SE3& T_later_left = SE3()) const;
 
  private:
   ScaleOptimizerConfig config_;

@@ -29,7 +29,7 @@ int padded_size(std::size_t n) {
 }  // namespace
 
 void ScalePoints::prepare(const KeyframeSnapshot& keyframe, const StereoRig& rig,
-                          double min_relative_sigma) {
+                          const SE3& T_later_left, double min_relative_sigma) {
   const KeyframePoints& points = keyframe.points;
   const auto n = static_cast<std::size_t>(padded_size(points.size()));
   for (const auto array : kArrays) (this->*array).assign(n, 1.0F);
@@ -37,6 +37,8 @@ void ScalePoints::prepare(const KeyframeSnapshot& keyframe, const StereoRig& rig
   const Mat3 r = rig.T_right_left.rotation_matrix();
   const Vec3 translation = rig.T_right_left.translation();
   for (int i = 0; i < 3; ++i) t[i] = static_cast<float>(translation[i]);
+  const Mat3 turn = T_later_left.rotation_matrix();
+  const Vec3 shift = T_later_left.translation();
   const CameraModel& camera = keyframe.camera;
   std::size_t k = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -45,9 +47,11 @@ void ScalePoints::prepare(const KeyframeSnapshot& keyframe, const StereoRig& rig
     const double y = (static_cast<double>(points.v[i]) - camera.cy) / camera.fy;
     u[k] = points.u[i];
     v[k] = points.v[i];
-    mx[k] = static_cast<float>(r(0, 0) * x + r(0, 1) * y + r(0, 2));
-    my[k] = static_cast<float>(r(1, 0) * x + r(1, 1) * y + r(1, 2));
-    mz[k] = static_cast<float>(r(2, 0) * x + r(2, 1) * y + r(2, 2));
+    const Vec3 ray = turn * Vec3(x, y, 1.0) + static_cast<double>(points.inverse_depth[i]) * shift;
+    const Vec3 m = r * ray;
+    mx[k] = static_cast<float>(m.x());
+    my[k] = static_cast<float>(m.y());
+    mz[k] = static_cast<float>(m.z());
     inverse_depth[k] = points.inverse_depth[i];
     const float relative =
         std::max(points.sigma[i] / points.inverse_depth[i], static_cast<float>(min_relative_sigma));

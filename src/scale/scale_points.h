@@ -10,6 +10,10 @@ namespace sovo {
 /// array a quantity. With the rotated ray m = R K^-1 (u, v, 1), a point lies at
 /// s m / rho + t in the right camera (paper, eq. 5), in the direction m + (rho / s) t.
 ///
+/// Where the right image was exposed at another instant, m is the ray from where the left camera
+/// was then: m = R (R' K^-1 (u, v, 1) + rho t') with T_later_left = (R', t'), whose length t' has
+/// the unit of the points and so takes the same scale s.
+///
 /// Arrays are padded to a multiple of `kLanes` with points that are never visible.
 struct ScalePoints {
   static constexpr int kLanes = 8;
@@ -25,7 +29,8 @@ struct ScalePoints {
   AlignedVector<float> visible;            ///< 1, or 0 where padded or hidden by nearer points.
 
   /// Takes over the points of a keyframe; those without a positive finite depth are left out.
-  void prepare(const KeyframeSnapshot& keyframe, const StereoRig& rig, double min_relative_sigma);
+  void prepare(const KeyframeSnapshot& keyframe, const StereoRig& rig, const SE3& T_later_left,
+               double min_relative_sigma);
 
   /// Every `stride`-th point of `all`.
   void take_every(int stride, const ScalePoints& all);

@@ -211,6 +211,7 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
   take_snapshot();
   result.left = marginalize(timer);
   add_immature_points(stereo.depths, timer);
+  window_.newest().T_later_left = stereo.T_later_left;
   set_right_image(stereo.right, &window_.newest());
   history_.record(window_poses());
   result.active_points = window_.num_active_points();

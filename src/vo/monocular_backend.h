@@ -38,6 +38,8 @@ using DepthProposer = std::function<void(const std::vector<SelectedPixel>& pixel
 struct KeyframeStereo {
   DepthProposer depths;   ///< Of its new pixels; empty: they begin without.
   ImagePyramidPtr right;  ///< Its raw right image, for static residuals; null: it gets none.
+  /// The left camera at the keyframe's instant into where it was when `right` was exposed.
+  SE3 T_later_left;
 };
 
 /// A point that a map begins with.

@@ -70,7 +70,8 @@ void linearize_static(const StereoRig& rig, const WindowConfig& config, const Ke
                       const Point& point, LinearizedResidual* out) {
   out->state = ResidualState::kOutOfView;
   out->energy = 0.0F;
-  const EpipolarCurve curve = right_curve(rig, Vec2(point.u, point.v));
+  const EpipolarCurve curve =
+      right_curve(rig, rig.T_right_left * host.T_later_left, Vec2(point.u, point.v));
   const auto at = curve.at(point.rho);
   if (!at) return;
   const ImageF& image = host.right->level(0);
@@ -119,10 +120,11 @@ void refine_right_brightness(const StereoRig& rig, const WindowConfig& config, K
 BrightnessTransfer fit_right_brightness(const StereoRig& rig, const Keyframe& keyframe,
                                         const BrightnessTransfer& before) {
   const ImageF& image = keyframe.right->level(0);
+  const SE3 T_right_left = rig.T_right_left * keyframe.T_later_left;
   std::vector<PatternMeans> means;
   const auto add = [&](float u, float v, const std::array<float, kPatternSize>& colour,
                        double rho) {
-    const auto at = right_curve(rig, Vec2(u, v)).at(rho);
+    const auto at = right_curve(rig, T_right_left, Vec2(u, v)).at(rho);
     if (!at || !rig.right.contains(at->pixel, 6.0)) return;
     double left = 0.0;
     double right = 0.0;

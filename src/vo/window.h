@@ -76,7 +76,8 @@ struct Keyframe {
   std::int64_t stamp_ns = 0;
   double exposure_s = 0.0;
   ImagePyramidPtr pyramid;
-  ImagePyramidPtr right;                ///< Raw, of the same instant; null: no static residuals.
+  ImagePyramidPtr right;                ///< Raw; null: no static residuals.
+  SE3 T_later_left;                     ///< This camera into where it was when `right` was exposed.
   BrightnessTransfer right_brightness;  ///< From this keyframe's image to `right`.
 
   SE3 frozen_T_camera_world;

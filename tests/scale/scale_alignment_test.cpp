@@ -29,7 +29,7 @@ TEST_P(ProjectionTest, AgreesWithTheCameraModelAndItsDerivative) {
   const StereoRig rig = test::make_rig(GetParam());
   const auto keyframe = random_keyframe(rig.left, 203);
   ScalePoints points;
-  points.prepare(keyframe, rig, 0.01);
+  points.prepare(keyframe, rig, SE3(), 0.01);
   ScaleProjections found;
   for (const int level : {0, 2}) {
     const double sigma = 0.3;
@@ -66,7 +66,7 @@ TEST(RightProjection, PointsBehindAndBeyondTheFoldAreNowhere) {
   rig.T_right_left = SE3(SO3::exp(Vec3(0, 2.5, 0)), Vec3(-0.2, 0, 0));  // looks backwards
   const auto keyframe = random_keyframe(rig.left, 64);
   ScalePoints points;
-  points.prepare(keyframe, rig, 0.01);
+  points.prepare(keyframe, rig, SE3(), 0.01);
   ScaleProjections found;
   RightProjection(rig.right).project(points, 3.0, 0, &found);
   for (std::size_t i = 0; i < 64; ++i) {
@@ -93,7 +93,7 @@ TEST(ScaleAlignment, JacobianAgreesWithCentralDifferences) {
     }
     keyframe.pyramid = test::pyramid_of(image);
     ScaleWorkspace workspace;
-    workspace.points.prepare(keyframe, rig, 0.01);
+    workspace.points.prepare(keyframe, rig, SE3(), 0.01);
     const ScaleOptimizerConfig config;
     const RightProjection projection(rig.right);
     ScaleAlignment alignment(config, projection, *keyframe.pyramid, *keyframe.pyramid, &workspace);
@@ -138,7 +138,7 @@ TEST(ScaleAlignment, PointsBehindANearerOneAreHidden) {
   keyframe.points.inverse_depth = {near, far, far};
   keyframe.points.sigma = {0.001F, 0.001F, 0.001F};
   ScaleWorkspace workspace;
-  workspace.points.prepare(keyframe, rig, 0.01);
+  workspace.points.prepare(keyframe, rig, SE3(), 0.01);
   const ScaleOptimizerConfig config;
   const RightProjection projection(rig.right);
   ScaleAlignment alignment(config, projection, *keyframe.pyramid, *keyframe.pyramid, &workspace);

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "sovo/geometry/se3.h"
+#include "sovo/vo/motion_model.h"
+
+namespace sovo {
+
+/// How the left camera moves between its own exposure and that of the right camera, where the two
+/// are not triggered together: as in the frames before, with the acceleration that they show.
+class ExposureMotion {
+ public:
+  /// Notes where a frame was found.
+  void note(const ReferenceKeyframe& reference, const SE3& T_camera_reference,
+            std::int64_t stamp_ns);
+
+  /// T_later_left: the camera at the newest frame into where it is `offset_ns` later, in the unit
+  /// of that frame's map. The identity while no two frames are known.
+  SE3 until(std::int64_t offset_ns) const;
+
+ private:
+  /// Between two frames.
+  struct Step {
+    Vec6 rate;  ///< log(T_later_earlier) a second, (translation, rotation).
+    double seconds = 0.0;
+  };
+
+  MotionModel frames_;
+  double log_scale_ = 0.0;  ///< Of the map at the newest frame.
+  std::optional<Step> newest_, before_;
+};
+
+}  // namespace sovo

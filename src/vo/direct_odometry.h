@@ -75,7 +75,8 @@ class DirectOdometry final : public MonocularBackend {
                               double max_acceleration);
   /// The tracker's best of these motions; not good when the camera cannot be there.
   TrackingResult track_from_any(const TrackingReference& reference, const MonoFrame& frame,
-                                std::span<const SE3> hypotheses);
+                                std::span<const SE3> hypotheses,
+                                const std::optional<SE3>& expected);
   /// From the likely motions, and when none fits as expected, from those of a camera that was
   /// knocked.
   TrackingResult align(const TrackingReference& reference, const MonoFrame& frame);

@@ -56,9 +56,10 @@ void DirectOdometry::find_motion_hypotheses(const TrackingReference& reference,
 
 TrackingResult DirectOdometry::track_from_any(const TrackingReference& reference,
                                               const MonoFrame& frame,
-                                              std::span<const SE3> hypotheses) {
+                                              std::span<const SE3> hypotheses,
+                                              const std::optional<SE3>& expected) {
   LastTracking last = last_tracking_;
-  if (known_motion_) last.expected = known_motion_->expected;
+  last.expected = expected;
   TrackingResult out =
       tracker_.track(reference, *frame.pyramid, frame.exposure_s, last_affine_, hypotheses, last);
   if (out.good && known_motion_ && !is_reachable(*known_motion_, out.T_current_reference)) {
@@ -69,12 +70,16 @@ TrackingResult DirectOdometry::track_from_any(const TrackingReference& reference
 }
 
 TrackingResult DirectOdometry::align(const TrackingReference& reference, const MonoFrame& frame) {
-  TrackingResult likely = track_from_any(reference, frame, hypotheses_);
-  if (!known_motion_ || (likely.good && likely.as_expected)) return likely;
+  if (!known_motion_) return track_from_any(reference, frame, hypotheses_, std::nullopt);
+  TrackingResult likely = track_from_any(reference, frame, hypotheses_, known_motion_->expected);
+  if (likely.good && likely.as_expected) return likely;
   const std::vector<SE3> knocked =
       tracker_.rank(reference, *frame.pyramid, frame.exposure_s, last_affine_,
                     knocked_motions(*known_motion_, reference.levels.back().camera), kMotionsKept);
-  TrackingResult found = track_from_any(reference, frame, knocked);
+  // The best of so many starts that leads to where the motion led is not there by chance.
+  const bool confirms = !likely.good && likely.inliers > 0;
+  TrackingResult found = track_from_any(
+      reference, frame, knocked, confirms ? likely.T_current_reference : known_motion_->expected);
   const bool better =
       likely.good ? found.good && found.rmse < likely.rmse : found.good || found.out_of_reach;
   return better ? found : likely;

@@ -129,7 +129,8 @@ struct NodeSection {
     v("left", left, "left image topic of a ROS 2 driver or bag; empty: frames of sovo");
     v("right", right, "its right image topic");
     v("pair_tolerance_s", pair_tolerance_s, "largest difference of stamps in its pairs [s]");
-    v("idle_exit_s", idle_exit_s, "sovo vo ends when no frame came this long [s]; 0: never");
+    v("idle_exit_s", idle_exit_s,
+      "sovo vo ends when no frame came this long after the last one [s]; 0: never");
   }
 };
 

@@ -286,7 +286,8 @@ void add_vo_command(const Command& program) {
       .value("--left", "node.left", "Left image topic of any ROS 2 driver", "TOPIC")
       .value("--right", "node.right", "Its right one; calibration from camera_info beside", "TOPIC")
       .value("--frames", "camera.frames", "End after so many frames", "N")
-      .value("--idle-exit", "node.idle_exit_s", "End when no frame came this long", "SECONDS");
+      .value("--idle-exit", "node.idle_exit_s",
+             "End when no frame came this long after the last one", "SECONDS");
   add_odometry_options(*options);
   add_dds_options(*options);
   command.action([options] {

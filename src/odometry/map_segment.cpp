@@ -16,6 +16,8 @@ constexpr std::size_t kMatchBlock = 64;
 /// Frames from one search for stereo depth to the next while the map begins: two views take their
 /// time, and meanwhile a camera may be uncovered, or come to another texture.
 constexpr std::uint32_t kStereoEvery = 5;
+/// Of a camera of which nothing is known yet [m/s].
+constexpr double kUnknownSpeed = 1.0;
 /// So many keyframes wait for a scale, the newest ones: a map may go without one for days.
 constexpr std::size_t kMostWaiting = 200;
 
@@ -158,9 +160,13 @@ bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage&
     return false;
   }
   if (stereo()) vo_->use_static_residuals(rig());
-  vo_->begin(frame, T_odom_left_start_, points, stereo() ? right_pyramid : nullptr);
-  // Matching errors are independent; what remains is common to all (calibration).
-  filter_.lock_initial(1.0 / std::sqrt(scale_information), frame.stamp_ns);
+  const bool at_once = right.stamp_offset_ns == 0;
+  vo_->begin(frame, T_odom_left_start_, points, stereo() && at_once ? right_pyramid : nullptr);
+  // Matching errors are independent; what remains is common to all: the calibration, and where the
+  // right camera went until its own exposure, as no motion is known yet.
+  const double matching = 1.0 / std::sqrt(scale_information);
+  const double moved = kUnknownSpeed * 1e-9 * static_cast<double>(right.stamp_offset_ns);
+  filter_.lock_initial(std::hypot(matching, moved / rig().baseline()), frame.stamp_ns);
   publish_scale(nullptr, true);
   initialized_ = true;
   stereo_problem_.clear();

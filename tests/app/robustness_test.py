@@ -55,6 +55,12 @@ class Robustness(SimTest):
         self.assertNotIn("segment", self.log)
         self.assertLess(largest_error(live, truth, live[0][0]), 0.03)
 
+    def test_cameras_that_are_not_triggered_together(self):
+        # Half a period apart: taken as of one instant it is more than a metre off.
+        for part in (("--trajectory", "race", "--frames", 100), ("--frames", 120, "--reverse")):
+            truth, live = self.fly("hall", *part, right_offset_ms=25)
+            self.expect_whole(truth, live, 0.1)
+
     def test_turbid_water_leaves_a_fifth_of_the_contrast(self):
         self.expect_whole(*self.fly("pool", "--frames", 80, veil=0.8), 0.05)
 

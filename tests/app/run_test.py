@@ -233,6 +233,22 @@ class RecordedClips(CommandTest):
     def test_kitti(self):
         self.complete("kitti/sequences/06", "--frames", 30)
 
+    def test_a_third_of_the_pairs_while_the_camera_turns(self):
+        source = SHARED / "data/euroc/MH_01_head/mav0"
+        if not source.is_dir():
+            raise unittest.SkipTest(f"SKIPPED: no recording at {source} (set SOVO_SHARED)")
+        for camera in ("cam0", "cam1"):
+            folder = self.folder / "third/mav0" / camera
+            (folder / "data").mkdir(parents=True)
+            shutil.copy(source / camera / "sensor.yaml", folder)
+            head, *rows = (source / camera / "data.csv").read_text().splitlines()
+            kept = rows[:60:3]
+            (folder / "data.csv").write_text("\n".join([head, *kept]) + "\n")
+            for row in kept:
+                image = row.split(",")[1].strip()
+                (folder / "data" / image).symlink_to(source / camera / "data" / image)
+        self.complete(self.folder / "third")
+
     def test_by_features(self):
         self.complete("euroc/MH_01_head", "--frames", 40, "--backend", "features")
         self.complete("kitti/sequences/06", "--frames", 20, "--backend", "features",

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "sovo/odometry/stereo_odometry.h"
@@ -29,7 +30,7 @@ inline StereoCameras test_cameras() {
 }
 
 /// A vehicle that comes forward and to the side, turning and swaying a little.
-inline SE3 drive(int i) {
+inline SE3 drive(double i) {
   const double s = 0.02 * i;
   return {SO3::exp(Vec3(0.012 * std::sin(5 * s), -0.12 * s, 0.015 * std::sin(3 * s))),
           Vec3(1.3 * s, 0.06 * std::sin(4 * s), 0.7 * s)};
@@ -60,6 +61,23 @@ inline StereoFrame drive_frame(int i) {
   frame.left = side_of(scene.render(cameras.rig.left, pose));
   frame.right = side_of(scene.render(cameras.rig.right, pose * cameras.rig.T_right_left.inverse()));
   return rendered.emplace(i, frame).first->second;
+}
+
+/// Frame `i` of the drive, of cameras that are not triggered together; rendered once a program.
+inline StereoFrame staggered_frame(int i, std::int64_t right_offset_ns) {
+  static const SyntheticScene scene(3);
+  static std::map<std::pair<int, std::int64_t>, StereoFrame> rendered;
+  const auto found = rendered.find({i, right_offset_ns});
+  if (found != rendered.end()) return found->second;
+  const StereoCameras cameras = test_cameras();
+  StereoFrame frame = drive_frame(i);
+  const double later = i + static_cast<double>(right_offset_ns) / static_cast<double>(kPeriodNs);
+  frame.right =
+      side_of(scene.render(cameras.rig.right, drive(later) * cameras.rig.T_right_left.inverse()));
+  frame.right.stamp_offset_ns = right_offset_ns;
+  frame.pair_error_s = 1e-9 * std::abs(static_cast<double>(right_offset_ns));
+  rendered[{i, right_offset_ns}] = frame;
+  return frame;
 }
 
 /// The first frame of the drive, as a rig sees it whose baseline is shorter by `factor`: depths

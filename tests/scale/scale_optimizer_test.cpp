@@ -63,6 +63,25 @@ TEST(ScaleOptimizer, TracksFromTenPercentOff) {
   }
 }
 
+TEST(ScaleOptimizer, KnowsWhereTheCameraWasAtTheOtherExposure) {
+  StereoView v = view(Right::kRadtan);
+  const SE3 T_later_left(SO3::exp(Vec3(0.003, -0.008, 0.004)), Vec3(0.03, -0.01, -0.05));
+  v.right = scene(1).render(v.rig.right, (v.rig.T_right_left * T_later_left).inverse());
+  for (const double log_scale : {-1.0, 0.05, 1.0}) {
+    const auto keyframe = make_keyframe(v, scene(1), {.log_scale = log_scale});
+    SE3 in_map = T_later_left;  // the map's lengths are too short by that much
+    in_map.translation() *= std::exp(-log_scale);
+    const ScaleOptimizer optimizer({}, v.rig);
+    const auto right = pyramid_of(v.right);
+    const ScaleEstimate found = optimizer.estimate(keyframe, *right, true, in_map);
+    EXPECT_EQ(found.verdict, ScaleVerdict::kAccepted) << to_string(found.verdict);
+    EXPECT_NEAR(found.log_scale, log_scale, 0.002);
+    EXPECT_NEAR(found.epipolar_px, 0.0, 0.1);
+    const ScaleEstimate ignorant = optimizer.estimate(keyframe, *right, true);
+    EXPECT_GT(std::abs(ignorant.log_scale - log_scale), 0.01);
+  }
+}
+
 TEST(ScaleOptimizer, FindsGainAndBiasBetweenTheCameras) {
   StereoView v = view(Right::kRadtan);
   test::apply_brightness(0.85, 12.0, &v.right);

@@ -95,6 +95,28 @@ TEST(StaticResidual, MovesWithInverseDepthAsCentralDifferencesSay) {
   EXPECT_GT(checked, 50);
 }
 
+TEST(StaticResidual, LiesWhereTheRightCameraWasAtItsOwnExposure) {
+  Window window = stereo_window();
+  const SE3 T_later_left(SO3::exp(Vec3(0.004, -0.006, 0.003)), Vec3(0.01, -0.005, -0.03));
+  const auto project = [&](const Point& p, const SE3& T_later) {
+    const Vec3 ray((static_cast<double>(p.u) - window.camera().cx) / window.camera().fx,
+                   (static_cast<double>(p.v) - window.camera().cy) / window.camera().fy, 1.0);
+    const Vec3 point = T_later * Vec3(ray / static_cast<double>(p.rho));
+    return Vec2(*window.rig()->right.project(window.rig()->T_right_left * point));
+  };
+  window[1].T_later_left = T_later_left;
+  int checked = 0;
+  for (const Point& p : window[1].points) {
+    const LinearizedResidual at = static_residual(window, 1, p);
+    if (at.state == ResidualState::kOutOfView) continue;
+    const Vec2 centre(static_cast<double>(at.centre_u), static_cast<double>(at.centre_v));
+    EXPECT_LT((centre - project(p, T_later_left)).norm(), 1e-3);
+    EXPECT_GT((centre - project(p, SE3())).norm(), 0.1);
+    ++checked;
+  }
+  EXPECT_GT(checked, 50);
+}
+
 TEST(StaticResidual, FindsTheDepthByItself) {
   // Through a bent lens, and from three per cent beside it: a third of a pixel and more.
   const Window window = stereo_window();

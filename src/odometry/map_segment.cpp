@@ -232,7 +232,14 @@ bool MapSegment::matches_new_pixels() const {
   if (config_.mode == OdometryMode::kMono || config_.depth_init == DepthInit::kTemporal)
     return false;
   // Static residuals need them: their images' brightness is fitted there.
-  return config_.depth_init == DepthInit::kStereo || stereo() || assist_.wanted();
+  return config_.depth_init == DepthInit::kStereo || static_residuals() || assist_.wanted();
+}
+
+bool MapSegment::static_residuals() const {
+  const bool assisted = config_.mode == OdometryMode::kScale &&
+                        config_.backend == Backend::kDirect &&
+                        config_.depth_init != DepthInit::kTemporal && assist_.holds_scale();
+  return stereo() || assisted;
 }
 
 MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* right) {
@@ -259,7 +266,10 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
       keyframe_stereo.depths = stereo_proposer(tracked.frame.pyramid, *job.right, job.T_later_left);
     }
     keyframe_stereo.T_later_left = job.T_later_left;
-    if (stereo() && metric) keyframe_stereo.right = job.right;
+    if (static_residuals() && metric) {
+      vo_->use_static_residuals(rig());
+      keyframe_stereo.right = job.right;
+    }
   }
   out.map = vo_->map(tracked, keyframe_stereo, timer);
   broken_ = out.map.failed;
@@ -309,7 +319,7 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
   const double sigma_before = filter_.path_sigma();
   const ScaleUpdate update =
       stereo() ? filter_.watch(m, window_scale_variance_) : filter_.update(m);
-  assist_.on_scale(update.verdict != ScaleVerdict::kInnovation);
+  assist_.on_scale(update.verdict);
   ScaleRecord record;
   record.stamp_ns = job.snapshot.stamp_ns;
   record.keyframe_id = job.snapshot.id;
@@ -325,7 +335,6 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
     correction.first_lock = !was_locked;
     record.correction = vo_->apply(correction);
     if (correction.first_lock) refined_until_ = 0;  // it rescales what was built before
-    if (stereo()) vo_->use_static_residuals(rig());
   }
   if (was_locked) {
     extend_scale_path(position, sigma_before);

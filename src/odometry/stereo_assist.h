@@ -1,5 +1,7 @@
 #pragma once
 
+#include "sovo/scale/scale_optimizer.h"
+
 namespace sovo {
 
 struct StereoAssistConfig {
@@ -8,6 +10,7 @@ struct StereoAssistConfig {
   double min_inliers = 0.65;   ///< Share of pixels that agree, below which it is called.
   int disagreements = 2;       ///< Scales in a row that disagree, which call it.
   int good_keyframes = 3;      ///< In a row, after which it goes.
+  bool hold_scale = true;      ///< Static residuals while the scale sees too few points.
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -16,18 +19,25 @@ struct StereoAssistConfig {
     v("min_inliers", min_inliers, "share of pixels that agree, below which it is called");
     v("disagreements", disagreements, "scales in a row that disagree, which call it");
     v("good_keyframes", good_keyframes, "good keyframes in a row after which it goes");
+    v("hold_scale", hold_scale,
+      "mode scale, direct, unless depth_init is temporal: while scale optimization sees too few "
+      "points, new keyframes get static residuals");
   }
 };
 
 /// Tells when the monocular odometry fails and stereo matching must help it (the future work of the
 /// paper): while too few points find their depth in later images, tracking fits badly or the scale
-/// jumps, new pixels get their depths from the right image at once.
+/// jumps, new pixels get their depths from the right image at once. And where points leave the view
+/// so soon that too few are left for scale optimization, static residuals hold the scale.
 class StereoAssist {
  public:
   explicit StereoAssist(const StereoAssistConfig& config) : config_(config) {}
 
   /// Whether the next keyframe's pixels are to be matched.
   bool wanted() const { return wanted_; }
+
+  /// Whether the next keyframe is to have static residuals.
+  bool holds_scale() const { return holds_scale_; }
 
   /// A keyframe was mapped: active points, of those wanted, and the share of pixels that agreed.
   void on_keyframe(double points, double inliers) {
@@ -39,14 +49,21 @@ class StereoAssist {
     if (good_ >= config_.good_keyframes) wanted_ = false;
   }
 
-  /// A scale was sought and found, and agrees with the one known or does not.
-  void on_scale(bool agrees) { disagreed_ = agrees ? 0 : disagreed_ + 1; }
+  /// What came of the search for a keyframe's scale.
+  void on_scale(ScaleVerdict verdict) {
+    disagreed_ = verdict == ScaleVerdict::kInnovation ? disagreed_ + 1 : 0;
+    measured_ = verdict == ScaleVerdict::kAccepted ? measured_ + 1 : 0;
+    if (verdict == ScaleVerdict::kTooFewPoints) holds_scale_ = config_.hold_scale;
+    if (measured_ >= config_.good_keyframes) holds_scale_ = false;
+  }
 
  private:
   StereoAssistConfig config_;
   bool wanted_ = false;
   int good_ = 0;
   int disagreed_ = 0;
+  bool holds_scale_ = false;
+  int measured_ = 0;  ///< Scales in a row that were accepted.
 };
 
 }  // namespace sovo

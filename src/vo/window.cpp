@@ -54,17 +54,21 @@ void Window::clear() {
   keyframes_.clear();
   prior_ = Prior();
   scale_held_ = false;
+  keyframes_without_statics_ = 0;
   renumber();
 }
 
 void Window::update_scale_held() {
   constexpr std::ptrdiff_t kFewest = 50;
+  constexpr int kForgotten = 20;  // keyframes, three times a window's
   std::ptrdiff_t residuals = 0;
   for (const auto& k : keyframes_) {
     residuals += std::count_if(k->points.begin(), k->points.end(),
                                [](const Point& p) { return p.static_state == ResidualState::kIn; });
   }
-  scale_held_ = scale_held_ || residuals >= kFewest;
+  keyframes_without_statics_ = residuals > 0 ? 0 : keyframes_without_statics_ + 1;
+  if (residuals >= kFewest) scale_held_ = true;
+  if (keyframes_without_statics_ >= kForgotten) scale_held_ = false;
 }
 
 int Window::index_of(std::uint32_t id) const {

@@ -136,7 +136,8 @@ class Window {
   /// Whether static residuals, present or folded into the prior, hold the scale: then it is no
   /// gauge direction.
   bool scale_held() const { return scale_held_; }
-  /// From fifty static residuals on they hold the scale.
+  /// Of a new keyframe: from fifty static residuals on they hold the scale, until there have been
+  /// none for so long that the prior has forgotten them.
   void update_scale_held();
   int size() const { return static_cast<int>(keyframes_.size()); }
   bool empty() const { return keyframes_.empty(); }
@@ -190,6 +191,7 @@ class Window {
   CameraModel camera_;
   std::optional<StereoRig> rig_;
   bool scale_held_ = false;
+  int keyframes_without_statics_ = 0;
   std::vector<std::unique_ptr<Keyframe>> keyframes_;
   std::array<int, kMaxSlots> slot_index_{};
   Prior prior_;

@@ -19,7 +19,7 @@ TEST(StereoAssist, IsNotThereBeforeSomethingFails) {
   for (int i = 0; i < 5; ++i) {
     EXPECT_FALSE(assist.wanted());
     assist.on_keyframe(kMiddling, kGood);
-    assist.on_scale(true);
+    assist.on_scale(ScaleVerdict::kAccepted);
   }
 }
 
@@ -47,18 +47,40 @@ TEST(StereoAssist, ComesWhenTrackingFitsBadly) {
 
 TEST(StereoAssist, ComesWhenTheScaleJumps) {
   StereoAssist assist({});
-  assist.on_scale(false);
+  assist.on_scale(ScaleVerdict::kInnovation);
   assist.on_keyframe(kMany, kGood);
-  assist.on_scale(true);
-  assist.on_scale(false);
+  assist.on_scale(ScaleVerdict::kAccepted);
+  assist.on_scale(ScaleVerdict::kInnovation);
   assist.on_keyframe(kMany, kGood);
   EXPECT_FALSE(assist.wanted()) << "two in a row";
-  assist.on_scale(false);
+  assist.on_scale(ScaleVerdict::kInnovation);
   assist.on_keyframe(kMany, kGood);
   EXPECT_TRUE(assist.wanted());
-  assist.on_scale(true);
+  assist.on_scale(ScaleVerdict::kAccepted);
   for (int i = 0; i < 3; ++i) assist.on_keyframe(kMany, kGood);
   EXPECT_FALSE(assist.wanted());
+}
+
+TEST(StereoAssist, HoldsTheScaleWhileItSeesTooFewPoints) {
+  StereoAssist assist({});
+  for (const ScaleVerdict verdict : {ScaleVerdict::kAccepted, ScaleVerdict::kInnovation,
+                                     ScaleVerdict::kUnobservable, ScaleVerdict::kNoRightImage}) {
+    assist.on_scale(verdict);
+    EXPECT_FALSE(assist.holds_scale());
+  }
+  assist.on_scale(ScaleVerdict::kTooFewPoints);
+  assist.on_scale(ScaleVerdict::kAccepted);
+  assist.on_scale(ScaleVerdict::kAccepted);
+  assist.on_scale(ScaleVerdict::kInnovation);
+  assist.on_scale(ScaleVerdict::kAccepted);
+  assist.on_scale(ScaleVerdict::kAccepted);
+  EXPECT_TRUE(assist.holds_scale()) << "three in a row";
+  assist.on_scale(ScaleVerdict::kAccepted);
+  EXPECT_FALSE(assist.holds_scale());
+
+  StereoAssist never({.hold_scale = false});
+  never.on_scale(ScaleVerdict::kTooFewPoints);
+  EXPECT_FALSE(never.holds_scale());
 }
 
 class StageCounter : public StageObserver {

@@ -11,6 +11,8 @@ namespace sovo {
 namespace {
 
 constexpr std::size_t kMotionsKept = 4;
+/// Of the mean depth, of a frame of which no motion is known.
+constexpr std::array kUnknownShares = {0.02, 0.04, 0.07, 0.11, 0.16, 0.21, 0.27, 0.33, 0.4, 0.48};
 
 /// Motions to try when none of the likely ones fits: a camera that was knocked turns by another
 /// angle than before, while its way goes on, or not. After a gap it may have gone any part of it.
@@ -46,7 +48,8 @@ void DirectOdometry::find_motion_hypotheses(const TrackingReference& reference,
   known_motion_ = forecast.known;
   if (!known_motion_) {
     hypotheses_ = tracker_.rank(reference, *frame.pyramid, frame.exposure_s, last_affine_,
-                                unknown_motions(forecast.last, reference.mean_rho), kMotionsKept);
+                                unknown_motions(forecast.last, reference.mean_rho, kUnknownShares),
+                                kMotionsKept);
     return;
   }
   const KnownMotion& known = *known_motion_;

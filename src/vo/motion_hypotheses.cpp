@@ -1,7 +1,6 @@
 #include "sovo/vo/motion_hypotheses.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace sovo {
@@ -28,10 +27,10 @@ int steps_to(double reach, double step, int most) {
 
 }  // namespace
 
-std::vector<SE3> unknown_motions(const SE3& around, double mean_rho) {
-  constexpr std::array<double, 7> kShares = {0.02, 0.04, 0.07, 0.11, 0.16, 0.23, 0.32};
+std::vector<SE3> unknown_motions(const SE3& around, double mean_rho,
+                                 std::span<const double> shares) {
   std::vector<SE3> out = {around};
-  for (const double share : kShares) {
+  for (const double share : shares) {
     for (int axis = 0; axis < 3; ++axis) {
       for (const double sign : {-1.0, 1.0}) {
         Vec3 t = Vec3::Zero();

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "sovo/geometry/camera_model.h"
@@ -7,10 +8,11 @@
 
 namespace sovo {
 
-/// Motions to try when none is known: `around` itself, then translations along each axis in shares
-/// of the mean depth, and rotations by a few degrees, all from there. `mean_rho`: mean inverse
-/// depth [1/m].
-std::vector<SE3> unknown_motions(const SE3& around, double mean_rho);
+/// Motions to try when none is known: `around` itself, then translations along each axis by these
+/// shares of the mean depth, and rotations by a few degrees, all from there. `mean_rho`: mean
+/// inverse depth [1/m].
+std::vector<SE3> unknown_motions(const SE3& around, double mean_rho,
+                                 std::span<const double> shares);
 
 /// Turns by up to `reach` around each axis [rad], dense enough for alignment on `level` to begin
 /// from one of them: a pixel of it apart.

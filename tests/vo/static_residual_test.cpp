@@ -95,6 +95,26 @@ TEST(StaticResidual, MovesWithInverseDepthAsCentralDifferencesSay) {
   EXPECT_GT(checked, 50);
 }
 
+TEST(StaticResidual, HoldsTheScaleUntilThePriorHasForgottenIt) {
+  Window window = stereo_window();
+  const auto set_all = [&](ResidualState state) {
+    for (int i = 0; i < window.size(); ++i) {
+      for (Point& p : window[i].points) p.static_state = state;
+    }
+  };
+  ASSERT_TRUE(window.scale_held());
+  set_all(ResidualState::kOutOfView);
+  for (int i = 0; i < 19; ++i) {
+    window.update_scale_held();
+    EXPECT_TRUE(window.scale_held()) << i;
+  }
+  window.update_scale_held();
+  EXPECT_FALSE(window.scale_held());
+  set_all(ResidualState::kIn);
+  window.update_scale_held();
+  EXPECT_TRUE(window.scale_held());
+}
+
 TEST(StaticResidual, LiesWhereTheRightCameraWasAtItsOwnExposure) {
   Window window = stereo_window();
   const SE3 T_later_left(SO3::exp(Vec3(0.004, -0.006, 0.003)), Vec3(0.01, -0.005, -0.03));

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <optional>
 #include <utility>
 
@@ -26,6 +27,8 @@ TrackedFrame FeatureOdometry::track_from(const MonoFrame& frame, const SE3& T_cu
 /// says, whose way goes on or ended; and where that does not do, from the best of many.
 FeatureTracking FeatureOdometry::align(const FeatureReference& reference, const MonoFrame& frame,
                                        const MotionModel::Forecast& forecast) const {
+  // From more starts corners fit a regular pattern by chance.
+  constexpr std::array kShares = {0.02, 0.04, 0.07, 0.11, 0.16, 0.23, 0.32};
   const SE3 expected = forecast.known ? forecast.known->expected : forecast.last;
   FeatureTracking best = tracker_.track(reference, *frame.pyramid, expected,
                                         forecast.known ? config_.levels - 1 : config_.levels);
@@ -45,7 +48,7 @@ FeatureTracking FeatureOdometry::align(const FeatureReference& reference, const 
   }
   if (best.tracking.good && forecast.known) return best;
   try_next(tracker_.best_of(reference, *frame.pyramid,
-                            unknown_motions(others.front(), reference.mean_rho)));
+                            unknown_motions(others.front(), reference.mean_rho, kShares)));
   return best;
 }
 

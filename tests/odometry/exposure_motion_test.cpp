@@ -51,7 +51,7 @@ TEST(ExposureMotion, FollowsAWayThatTurnsAndAccelerates) {
     }
     const auto offset = static_cast<std::int64_t>(part * static_cast<double>(kPeriodNs));
     // The motion in this time is 14 mm at most.
-    EXPECT_LT(motion_between(motion.until(offset), true_motion(3, part)), 1e-4) << part;
+    EXPECT_LT(motion_between(motion.until(offset), true_motion(3, part)), 3e-5) << part;
   }
 }
 

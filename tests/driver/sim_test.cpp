@@ -152,6 +152,62 @@ INSTANTIATE_TEST_SUITE_P(AllWorlds, WarpTest,
                          ::testing::Values(World::kLawn, World::kPool, World::kStreet,
                                            World::kHall));
 
+TEST(RendererTest, RowsOfARollingShutterAreOfTheirOwnInstants) {
+  for (const World world : {World::kStreet, World::kPool}) {
+    const Motion motion = own_motion(world);
+    const Scene scene = build_scene(world, motion, 1);
+    const StereoRig rig = small_rig(Distortion::kRadtan);
+    Renderer renderer(scene, rig.left);
+    const auto view_of = [&](double row) {
+      const double t = 6.0 + 3e-4 * (row - 55.5);
+      return Renderer::View{motion.at(t), t};
+    };
+    RenderedImage rolled;
+    renderer.render_rolling(view_of, &rolled);
+    RenderedImage at_once;
+    renderer.render(motion.at(6.0), 6.0, &at_once);
+    EXPECT_FALSE(std::equal(at_once.light.row(4), at_once.light.row(5), rolled.light.row(4)));
+    // Four rows share an instant.
+    for (const int y : {4, 7, 16, 55, 108, 111}) {
+      const Renderer::View view = view_of(4 * (y / 4) + 1.5);
+      renderer.render(view.T_world_camera, view.t, &at_once);
+      EXPECT_TRUE(std::equal(at_once.light.row(y), at_once.light.row(y) + rig.left.width,
+                             rolled.light.row(y)))
+          << name_of(world) << " " << y;
+      EXPECT_TRUE(std::equal(at_once.range.row(y), at_once.range.row(y) + rig.left.width,
+                             rolled.range.row(y)))
+          << name_of(world) << " " << y;
+    }
+  }
+}
+
+TEST(SimSourceTest, ARollingShutterGoesOnWhenTheFlightIsReversed) {
+  SimConfig config = quiet(World::kHall);
+  config.sensor.read_noise = config.sensor.shot_noise = 0.0;
+  config.start = 40;
+  config.frames = 1;
+  config.sensor.readout_ms = 20.0;
+  config.sensor.auto_exposure = false;
+  // The same place on the way, there and back: rows that come later see what lies ahead, or behind.
+  const StereoRig rig = small_rig(Distortion::kNone);
+  SimSource forward = make_source(config, rig);
+  const StereoFrame there = first_frame(forward);
+  config.reverse = true;
+  const double duration = own_motion(World::kHall).duration_s();
+  config.start = static_cast<int>(std::lround(duration * 20.0)) - 40;
+  SimSource backward = make_source(config, rig);
+  const StereoFrame back = first_frame(backward);
+  const auto differing = [&](int row) {
+    int count = 0;
+    for (int x = 0; x < there.left.width; ++x) {
+      const auto i = static_cast<std::size_t>(row * there.left.step + x);
+      count += (*there.left.data)[i] != (*back.left.data)[i] ? 1 : 0;
+    }
+    return count;
+  };
+  EXPECT_GT(differing(0) + differing(111), 2 * (differing(54) + differing(57)));
+}
+
 TEST(SimSourceTest, EqualSeedsGiveEqualBytesWithAnyNumberOfThreads) {
   SimConfig config = quiet(World::kHall);
   config.sensor = {};

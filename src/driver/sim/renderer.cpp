@@ -57,31 +57,58 @@ void Renderer::render(const SE3& T_world_camera, double t, RenderedImage* image)
   const CameraModel& camera = rays_.camera();
   image->light.resize(camera.width, camera.height);
   image->range.resize(camera.width, camera.height);
-  view_.update(T_world_camera, t);
-  shader_.update(T_world_camera, t);
-  find_surfaces();
-  for (int tile = 0; tile < rays_.num_tiles(); ++tile) shade_tile(tile, image);
-  draw_particles(T_world_camera, t, image);
+  render_band({T_world_camera, t}, {0, camera.height}, image);
 }
 
-void Renderer::find_surfaces() {
-  std::fill(range_.begin(), range_.end(), kInfinity);
-  std::fill(surface_.begin(), surface_.end(), kNothing);
-  std::vector<int> block_solid;
-  std::vector<int> block_pierced;
-  for (int block = 0; block < rays_.blocks_x() * rays_.blocks_y(); ++block) {
-    const int bx = block % rays_.blocks_x();
-    const int by = block / rays_.blocks_x();
-    view_.select(rays_.block_cone(bx, by), view_.solid(), &block_solid);
-    view_.select(rays_.block_cone(bx, by), view_.pierced(), &block_pierced);
-    for (int y = by * RayTable::kBlock; y < std::min(rays_.tiles_y(), (by + 1) * RayTable::kBlock);
-         ++y) {
-      for (int x = bx * RayTable::kBlock;
-           x < std::min(rays_.tiles_x(), (bx + 1) * RayTable::kBlock); ++x) {
+void Renderer::render_rolling(const std::function<View(double row)>& view_of,
+                              RenderedImage* image) {
+  // In a row's time little moves: 0.02 px a row by two radians a second of a common camera.
+  constexpr int kRows = 4;
+  const CameraModel& camera = rays_.camera();
+  image->light.resize(camera.width, camera.height);
+  image->range.resize(camera.width, camera.height);
+  for (int y = 0; y < camera.height; y += kRows) {
+    const Band band{y, std::min(camera.height, y + kRows)};
+    render_band(view_of(0.5 * (band.begin + band.end - 1)), band, image);
+  }
+}
+
+void Renderer::render_band(const View& view, const Band& band, RenderedImage* image) {
+  view_.update(view.T_world_camera, view.t);
+  shader_.update(view.T_world_camera, view.t);
+  find_surfaces(band);
+  const int first = band.begin / RayTable::kTile * rays_.tiles_x();
+  const int last = ((band.end - 1) / RayTable::kTile + 1) * rays_.tiles_x();
+  for (int tile = first; tile < last; ++tile) shade_tile(tile, band, image);
+  draw_particles(view, band, image);
+}
+
+/// Of the band's pixels and those beside it.
+void Renderer::find_surfaces(const Band& band) {
+  const int first = std::max(0, band.begin - 1) / RayTable::kTile;
+  const int last = std::min(rays_.camera().height - 1, band.end) / RayTable::kTile;
+  const auto begin = first * rays_.tiles_x() * RayTable::kTilePixels;
+  const auto end = (last + 1) * rays_.tiles_x() * RayTable::kTilePixels;
+  std::fill(range_.begin() + begin, range_.begin() + end, kInfinity);
+  std::fill(surface_.begin() + begin, surface_.begin() + end, kNothing);
+  for (int by = first / RayTable::kBlock; by <= last / RayTable::kBlock; ++by) {
+    find_in_block_row(by, first, last);
+  }
+}
+
+void Renderer::find_in_block_row(int by, int first_tile_row, int last_tile_row) {
+  const int first = std::max(first_tile_row, by * RayTable::kBlock);
+  const int last = std::min(last_tile_row, (by + 1) * RayTable::kBlock - 1);
+  for (int bx = 0; bx < rays_.blocks_x(); ++bx) {
+    view_.select(rays_.block_cone(bx, by), view_.solid(), &block_solid_);
+    view_.select(rays_.block_cone(bx, by), view_.pierced(), &block_pierced_);
+    const int right = std::min(rays_.tiles_x(), (bx + 1) * RayTable::kBlock);
+    for (int y = first; y <= last; ++y) {
+      for (int x = bx * RayTable::kBlock; x < right; ++x) {
         const int tile = y * rays_.tiles_x() + x;
         const auto at = static_cast<std::size_t>(tile);
-        view_.select(rays_.cone(tile), block_solid, &tile_solid_[at]);
-        view_.select(rays_.cone(tile), block_pierced, &tile_pierced_[at]);
+        view_.select(rays_.cone(tile), block_solid_, &tile_solid_[at]);
+        view_.select(rays_.cone(tile), block_pierced_, &tile_pierced_[at]);
         find_in_tile(tile);
       }
     }
@@ -116,7 +143,7 @@ void Renderer::look_around(int x0, int y0, Neighbourhood* around) const {
   }
 }
 
-void Renderer::shade_tile(int tile, RenderedImage* image) {
+void Renderer::shade_tile(int tile, const Band& band, RenderedImage* image) {
   const CameraModel& camera = rays_.camera();
   const int x0 = tile % rays_.tiles_x() * RayTable::kTile;
   const int y0 = tile / rays_.tiles_x() * RayTable::kTile;
@@ -124,7 +151,7 @@ void Renderer::shade_tile(int tile, RenderedImage* image) {
   Neighbourhood around;
   look_around(x0, y0, &around);
   samples_.clear();
-  for (int y = y0; y < std::min(camera.height, y0 + RayTable::kTile); ++y) {
+  for (int y = std::max(y0, band.begin); y < std::min(band.end, y0 + RayTable::kTile); ++y) {
     for (int x = x0; x < std::min(camera.width, x0 + RayTable::kTile); ++x) {
       const std::size_t i = rays_.index(x, y);
       image->light.at(x, y) = 0.0F;
@@ -194,18 +221,18 @@ void Renderer::add_edge(int x, int y, const int* around) {
   }
 }
 
-void Renderer::draw_particles(const SE3& T_world_camera, double t, RenderedImage* image) const {
+void Renderer::draw_particles(const View& view, const Band& band, RenderedImage* image) const {
   const Particles& p = scene_->particles;
   const CameraModel& camera = rays_.camera();
-  const SE3 T_camera_world = T_world_camera.inverse();
+  const SE3 T_camera_world = view.T_world_camera.inverse();
   Random random(p.seed);
   for (int i = 0; i < p.count; ++i) {
     // Each has its place in a lattice of equal boxes; the one nearest to the camera is drawn.
     Vec3 offset;
     for (int k = 0; k < 3; ++k) {
       const double home = random.uniform() * p.box;
-      const double sway = 0.05 * std::sin(0.7 * t + 6.3 * random.uniform());
-      const double place = home + p.drift[k] * t + sway - T_world_camera.translation()[k];
+      const double sway = 0.05 * std::sin(0.7 * view.t + 6.3 * random.uniform());
+      const double place = home + p.drift[k] * view.t + sway - view.T_world_camera.translation()[k];
       offset[k] = place - p.box * std::round(place / p.box);
     }
     const double size = random.uniform(0.4, 1.0);
@@ -225,7 +252,7 @@ void Renderer::draw_particles(const SE3& T_world_camera, double t, RenderedImage
     float brightness = lamps_.ambient * p.brightness;
     if (lamps_.lit()) brightness += p.brightness * lamps_.at(in_camera.cast<float>());
     const int reach = std::min(24, static_cast<int>(std::ceil(2.5 * wide)));
-    for (int y = std::max(0, cy - reach); y <= std::min(camera.height - 1, cy + reach); ++y) {
+    for (int y = std::max(band.begin, cy - reach); y < std::min(band.end, cy + reach + 1); ++y) {
       for (int x = std::max(0, cx - reach); x <= std::min(camera.width - 1, cx + reach); ++x) {
         if (double{image->range.at(x, y)} < distance) continue;
         const double r2 = (Vec2(x, y) - *pixel).squaredNorm() / (wide * wide);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <vector>
 
 #include "sovo/driver/sim/lamps.h"
@@ -30,6 +31,15 @@ class Renderer {
   /// The picture from a pose at time `t` of the world [s].
   void render(const SE3& T_world_camera, double t, RenderedImage* image);
 
+  /// When and from where a row of the image is taken.
+  struct View {
+    SE3 T_world_camera;
+    double t = 0.0;  ///< Of the world [s].
+  };
+  /// The picture of a rolling shutter: a few rows at a time are of one instant, as `view_of` tells
+  /// for a place on the image's vertical axis [px].
+  void render_rolling(const std::function<View(double row)>& view_of, RenderedImage* image);
+
   /// Distance along the ray of any place of the image at the pose rendered last, to surfaces
   /// without holes [m]; infinite for the sky.
   float range_at(const Vec2& pixel) const;
@@ -40,12 +50,19 @@ class Renderer {
   static constexpr int kSide = RayTable::kTile + 2;  ///< A tile with the pixels around it.
   using Neighbourhood = std::array<int, static_cast<std::size_t>(kSide) * kSide>;
 
-  void find_surfaces();
+  /// Rows of the image that are of one instant: [begin, end).
+  struct Band {
+    int begin = 0;
+    int end = 0;
+  };
+  void render_band(const View& view, const Band& band, RenderedImage* image);
+  void find_surfaces(const Band& band);
+  void find_in_block_row(int by, int first_tile_row, int last_tile_row);
   void find_in_tile(int tile);
-  void shade_tile(int tile, RenderedImage* image);
+  void shade_tile(int tile, const Band& band, RenderedImage* image);
   void look_around(int x0, int y0, Neighbourhood* around) const;
   void add_edge(int x, int y, const int* around);
-  void draw_particles(const SE3& T_world_camera, double t, RenderedImage* image) const;
+  void draw_particles(const View& view, const Band& band, RenderedImage* image) const;
 
   const Scene* scene_;
   Lamps lamps_;
@@ -57,6 +74,8 @@ class Renderer {
   AlignedVector<int> surface_;                ///< Index of a view.
   std::vector<std::vector<int>> tile_solid_;  ///< What each tile may see.
   std::vector<std::vector<int>> tile_pierced_;
+  std::vector<int> block_solid_;  ///< What the block at work may see.
+  std::vector<int> block_pierced_;
 };
 
 }  // namespace sovo::sim

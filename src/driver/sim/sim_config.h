@@ -78,6 +78,7 @@ struct SensorConfig {
   double shot_noise = 0.8;
   bool motion_blur = true;
   double right_offset_ms = 0.0;
+  double readout_ms = 0.0;
   double veil = 0.0;
   double light_factor = 1.0;
   double light_from_s = 0.0;
@@ -106,6 +107,8 @@ struct SensorConfig {
     v("shot_noise", shot_noise, "standard deviation added by light, at full scale [grey levels]");
     v("motion_blur", motion_blur, "blur by motion during the exposure");
     v("right_offset_ms", right_offset_ms, "the right camera exposes later by this [ms]");
+    v("readout_ms", readout_ms,
+      "rolling shutter: the last row is exposed later than the first by this [ms]; 0: all at once");
     v("veil", veil, "share of the light that fog or turbid water spreads evenly");
     v("light_factor", light_factor, "the world's light changes at once by this factor");
     v("light_from_s", light_from_s, "time from which on it is changed [s]");

@@ -105,6 +105,9 @@ Result<void> check(const SimConfig& config) {
   if (!(s.gap_s >= 0.0 && (s.gap_s == 0.0 || s.gap_s < s.gap_every_s))) {
     return Error{"sensor.gap_s must be below sensor.gap_every_s"};
   }
+  if (!(s.readout_ms >= 0.0 && s.readout_ms <= 1000.0)) {
+    return Error{"sensor.readout_ms must be in [0, 1000]"};
+  }
   if (!(s.max_exposure_ms > 0.0)) return Error{"sensor.max_exposure_ms must be positive"};
   if (s.read_noise < 0.0 || s.shot_noise < 0.0) return Error{"noise must not be negative"};
   return {};
@@ -167,20 +170,41 @@ Trajectory SimSource::truth() const {
   return poses;
 }
 
+/// Where a camera is at a time of the trajectory [s].
+SE3 SimSource::camera_at(Side which, double t) const {
+  const SE3 T_left_camera = which == Side::kLeft ? SE3() : calibration_.rig.T_right_left.inverse();
+  return motion_.at(t) * T_left_camera;
+}
+
+/// What a camera sees at a time of the trajectory [s], which is that of its middle row.
+void SimSource::take(Renderer* renderer, Side which, double t, RenderedImage* image) const {
+  const double readout_s = 1e-3 * config_.sensor.readout_ms;
+  if (readout_s == 0.0) {
+    renderer->render(camera_at(which, t), t, image);
+    return;
+  }
+  const int last_row = renderer->rays().camera().height - 1;
+  const double row_s = (config_.reverse ? -readout_s : readout_s) / last_row;
+  const auto view_of = [&](double row) {
+    const double at = t + (row - 0.5 * last_row) * row_s;
+    return Renderer::View{camera_at(which, at), at};
+  };
+  renderer->render_rolling(view_of, image);
+}
+
 SideImage SimSource::make_side(Side which, double t, std::uint64_t frame, Renderer* renderer,
                                ExposureControl* exposure, const Sensor& sensor) const {
-  const SE3 T_left_camera = which == Side::kLeft ? SE3() : calibration_.rig.T_right_left.inverse();
   const double along = config_.reverse ? -1.0 : 1.0;
-  const auto pose = [&](double time) { return motion_.at(time) * T_left_camera; };
   RenderedImage image;
-  renderer->render(pose(t), t, &image);
+  take(renderer, which, t, &image);
   const double since = time_of(frame);
   change_light(config_.sensor, since, &image.light);
   if (!settled_) exposure->settle(image.light);
   ImageF blurred;
   if (config_.sensor.motion_blur) {
     constexpr double h = 2e-3;
-    const Vec6 velocity = along * velocity_of(pose(t - h), pose(t + h), 2.0 * h);
+    const Vec6 velocity =
+        along * velocity_of(camera_at(which, t - h), camera_at(which, t + h), 2.0 * h);
     blur_by_motion(renderer->rays(), image, velocity, exposure->exposure_s(), &blurred);
   }
   const bool dark = config_.sensor.dark == which && since >= config_.sensor.dark_from_s &&

@@ -48,6 +48,8 @@ class SimSource : public FrameSource {
 
  private:
   SourceResult render(std::size_t n);
+  SE3 camera_at(Side which, double t) const;
+  void take(Renderer* renderer, Side which, double t, RenderedImage* image) const;
   SideImage make_side(Side which, double t, std::uint64_t frame, Renderer* renderer,
                       ExposureControl* exposure, const Sensor& sensor) const;
   double time_of(std::size_t index) const;

@@ -1,6 +1,7 @@
 #include "sovo/app/config_options.h"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 
@@ -231,6 +232,9 @@ Result<void> check_config(const AppConfig& config) {
   if (config.odometry.downscale < 1) return Error{"downscale must be at least 1"};
   if (config.odometry.max_halvings < 0 || config.odometry.max_halvings > 4) {
     return Error{"max_halvings must be 0 to 4"};
+  }
+  if (!(std::abs(config.odometry.readout_ms) <= 1000.0)) {
+    return Error{"readout_ms must be in [-1000, 1000]; negative: rows are read from below"};
   }
   if (config.odometry.mapping_queue < 1) return Error{"mapping_queue must be at least 1"};
   if (auto backend = check_backend(config.odometry); !backend) return backend;

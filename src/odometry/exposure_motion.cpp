@@ -1,5 +1,6 @@
 #include "sovo/odometry/exposure_motion.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace sovo {
@@ -8,6 +9,11 @@ void ExposureMotion::note(const ReferenceKeyframe& reference, const SE3& T_camer
                           std::int64_t stamp_ns) {
   const auto last_stamp_ns = frames_.last_stamp_ns();
   frames_.note(reference, T_camera_reference, stamp_ns);
+  if (last_stamp_ns == stamp_ns) {
+    const auto known = frames_.forecast(reference, stamp_ns, 0.0).known;
+    if (known && newest_) newest_->rate = known->step.log() / newest_->seconds;
+    return;
+  }
   before_ = newest_;
   if (before_) before_->rate.head<3>() *= std::exp(reference.log_scale - log_scale_);
   log_scale_ = reference.log_scale;
@@ -21,13 +27,17 @@ void ExposureMotion::note(const ReferenceKeyframe& reference, const SE3& T_camer
 SE3 ExposureMotion::until(std::int64_t offset_ns) const {
   if (offset_ns == 0 || !newest_) return {};
   const double offset = 1e-9 * static_cast<double>(offset_ns);
-  Vec6 rate = newest_->rate;
-  if (before_) {
-    // Each rate is that of the middle of its step, the one wanted that of the offset's middle.
-    const Vec6 change = newest_->rate - before_->rate;
-    rate += (newest_->seconds + offset) / (newest_->seconds + before_->seconds) * change;
-  }
-  return SE3::exp(offset * rate);
+  return SE3::exp(offset * rate_after(0.5 * offset));
+}
+
+Vec6 ExposureMotion::rate_after(double seconds) const {
+  if (!newest_) return Vec6::Zero();
+  if (!before_) return newest_->rate;
+  // Each rate is that of the middle of its step. What lies farther ahead than the next frame is not
+  // to be told from two steps.
+  constexpr double kFarthest = 1.5;
+  const double steps = (newest_->seconds + 2.0 * seconds) / (newest_->seconds + before_->seconds);
+  return newest_->rate + std::min(steps, kFarthest) * (newest_->rate - before_->rate);
 }
 
 }  // namespace sovo

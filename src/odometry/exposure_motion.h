@@ -8,17 +8,24 @@
 
 namespace sovo {
 
-/// How the left camera moves between its own exposure and that of the right camera, where the two
-/// are not triggered together: as in the frames before, with the acceleration that they show.
+/// How the left camera moves about the instant of a frame: as in the frames before, with the
+/// acceleration that they show. It tells where the camera goes until the right one exposes, where
+/// the two are not triggered together, and while a rolling shutter reads an image out.
 class ExposureMotion {
  public:
-  /// Notes where a frame was found.
+  /// Notes where a frame was found; noted again, the same frame was found there instead.
   void note(const ReferenceKeyframe& reference, const SE3& T_camera_reference,
             std::int64_t stamp_ns);
 
   /// T_later_left: the camera at the newest frame into where it is `offset_ns` later, in the unit
   /// of that frame's map. The identity while no two frames are known.
   SE3 until(std::int64_t offset_ns) const;
+
+  /// log(T_later_earlier) a second, (translation, rotation), as it is `seconds` after the newest
+  /// frame, in the unit of that frame's map. Zero while no two frames are known.
+  Vec6 rate_after(double seconds) const;
+  /// The mean rate until the frame before the newest one.
+  Vec6 rate_before() const { return before_ ? before_->rate : Vec6(Vec6::Zero()); }
 
  private:
   /// Between two frames.

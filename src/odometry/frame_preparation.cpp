@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <tuple>
 #include <utility>
 
@@ -46,7 +47,8 @@ FramePreparation::FramePreparation(const StereoOdometryConfig& config, const Ste
     : cameras_(cameras),
       downscale_(std::max(1, config.downscale)),
       max_levels_(config.vo.tracker.max_levels),
-      local_contrast_(config.local_contrast) {
+      local_contrast_(config.local_contrast),
+      readout_s_(1e-3 * config.readout_ms) {
   if (config.lighting == Lighting::kVehicle) left_contrast_.emplace(local_contrast_);
   const CameraModel raw_left = cameras.rig.left.downscaled(downscale_);
   StereoRig rig = cameras.rig;
@@ -57,6 +59,10 @@ FramePreparation::FramePreparation(const StereoOdometryConfig& config, const Ste
   if (!undistorter.is_identity()) {
     mask = undistorter.valid_mask(mask);
     undistorter_ = std::move(undistorter);
+  }
+  if (has_rolling_shutter()) {
+    left_unroller_.emplace(raw_left, rig.left);
+    right_unroller_.emplace(rig.right, rig.right);
   }
   add_resolutions(rig, mask, config.max_halvings);
 }
@@ -98,8 +104,29 @@ bool FramePreparation::takes_bytes(const SideImage& left) const {
          cameras_.left_photometric.empty();
 }
 
-void FramePreparation::write_left(const SideImage& left, ImageF* image) {
-  if (undistorter_ && takes_bytes(left)) {
+double FramePreparation::displacement(const Vec6& rate_difference, double rho) const {
+  if (!left_unroller_) return 0.0;
+  const double way = 0.5 * std::abs(readout_s_) * rate_difference.head<3>().norm();
+  return left_unroller_->reach(readout_s_ * rate_difference.tail<3>()) + rig().left.fx * rho * way;
+}
+
+RowShift FramePreparation::row_shift(const Vec6& rate, int halvings) const {
+  if (!left_unroller_) return {};
+  const int raw_rows = cameras_.rig.left.height / downscale_;
+  const double seconds_a_row = readout_s_ / (raw_rows - 1) * left_unroller_->raw_rows();
+  RowShift shift;
+  shift.seconds = (1 << halvings) * seconds_a_row;
+  shift.per_row = shift.seconds * rate.head<3>();
+  shift.middle =
+      static_cast<double>(to_halved(static_cast<float>(left_unroller_->middle_row()), halvings));
+  return shift;
+}
+
+void FramePreparation::write_left(const SideImage& left, const Vec3& turn, ImageF* image) {
+  if (left_unroller_ && !turn.isZero(0.0)) {
+    to_float(left, cameras_.left_photometric, downscale_, &raw_left_);
+    left_unroller_->apply(raw_left_, turn, &left_lattice_, image);
+  } else if (undistorter_ && takes_bytes(left)) {
     undistorter_->apply(left.data->data(), left.step, image);
   } else if (undistorter_) {
     to_float(left, cameras_.left_photometric, downscale_, &raw_left_);
@@ -110,15 +137,17 @@ void FramePreparation::write_left(const SideImage& left, ImageF* image) {
 }
 
 MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver* observer,
-                                         int halvings) {
+                                         int halvings, const Vec6& rate) {
   MonoFrame out;
+  out.rate = rate;
+  out.rows = row_shift(rate, halvings);
   out.stamp_ns = frame.stamp_ns;
   // Without its light an image does not depend on its exposure.
   if (!left_contrast_) out.exposure_s = frame.left.exposure_s;
   auto pyramid = left_pyramids_.take();
   std::optional<ScopedStage> stage(std::in_place, observer, Stage::kUndistortion);
   pyramid->rebuild(max_levels_, [&](ImageF* image) {
-    write_left(frame.left, image);
+    write_left(frame.left, readout_s_ * rate.tail<3>(), image);
     for (int h = 0; h < halvings; ++h) {
       std::swap(*image, unhalved_left_);
       halve(unhalved_left_, image);
@@ -130,9 +159,18 @@ MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver
   return out;
 }
 
-ImagePyramid FramePreparation::prepare_right(const SideImage& right, int halvings) const {
+ImagePyramid FramePreparation::prepare_right(const SideImage& right, int halvings,
+                                             const Vec6& rate) const {
   ImageF image;
   to_float(right, cameras_.right_photometric, downscale_, &image);
+  if (right_unroller_ && !rate.isZero(0.0)) {
+    // Both cameras turn alike, each about its own axes.
+    const Vec3 turn = readout_s_ * (cameras_.rig.T_right_left.rotation() * rate.tail<3>());
+    ImageF unrolled;
+    Unroller::Lattice lattice;
+    right_unroller_->apply(image, turn, &lattice, &unrolled);
+    image = std::move(unrolled);
+  }
   for (int h = 0; h < halvings; ++h) {
     ImageF halved;
     halve(image, &halved);

@@ -9,6 +9,7 @@
 #include "sovo/image/pyramid_pool.h"
 #include "sovo/image/stereo_frame.h"
 #include "sovo/image/undistorter.h"
+#include "sovo/image/unroller.h"
 #include "sovo/odometry/stereo_odometry.h"
 #include "sovo/vo/monocular_backend.h"
 
@@ -34,11 +35,20 @@ class FramePreparation {
   /// What is wrong with a side: missing, of another size, black; empty when nothing is.
   std::string check_side(const SideImage& side, bool is_left) const;
 
-  /// Left image ready to be tracked. Precondition: `check_side` found nothing.
-  MonoFrame prepare_left(const StereoFrame& frame, StageObserver* observer, int halvings = 0);
+  /// Left image ready to be tracked. `rate`: how a camera with a rolling shutter moves meanwhile
+  /// (MonoFrame::rate). Precondition: `check_side` found nothing.
+  MonoFrame prepare_left(const StereoFrame& frame, StageObserver* observer, int halvings = 0,
+                         const Vec6& rate = Vec6::Zero());
 
-  /// Right image ready for matching and scale optimization.
-  ImagePyramid prepare_right(const SideImage& right, int halvings = 0) const;
+  /// Right image ready for matching and scale optimization; `rate` as for the left one.
+  ImagePyramid prepare_right(const SideImage& right, int halvings = 0,
+                             const Vec6& rate = Vec6::Zero()) const;
+
+  /// Whether rows are exposed one after the other.
+  bool has_rolling_shutter() const { return readout_s_ != 0.0; }
+  /// How far apart what is `rho` [1/m] near lies in images that are prepared with rates that differ
+  /// so, at most [px].
+  double displacement(const Vec6& rate_difference, double rho) const;
 
  private:
   struct Resolution {
@@ -49,7 +59,8 @@ class FramePreparation {
     return resolutions_[static_cast<std::size_t>(halvings)];
   }
   void add_resolutions(const StereoRig& rig, const ImageU8& mask, int max_halvings);
-  void write_left(const SideImage& left, ImageF* image);
+  void write_left(const SideImage& left, const Vec3& turn, ImageF* image);
+  RowShift row_shift(const Vec6& rate, int halvings) const;
   /// Whether the pixels are resampled as they come, with nothing to be done before.
   bool takes_bytes(const SideImage& left) const;
 
@@ -60,6 +71,9 @@ class FramePreparation {
   LocalContrastConfig local_contrast_;
   std::optional<LocalContrast> left_contrast_;  ///< With lighting: vehicle.
   std::optional<Undistorter> undistorter_;
+  double readout_s_;
+  std::optional<Unroller> left_unroller_, right_unroller_;  ///< With a rolling shutter.
+  Unroller::Lattice left_lattice_;
   ImageF raw_left_;
   ImageF unhalved_left_;
   PyramidPool left_pyramids_;

@@ -79,6 +79,7 @@ MapSegment::MapSegment(const StereoOdometryConfig& config, const FramePreparatio
       observer_(observer),
       vo_(new_backend(config, rig().left, preparation.left_mask(halvings), halvings, pool)),
       matcher_(config.matcher, rig()),
+      readout_motion_(preparation),
       optimizer_(config.scale, rig()),
       filter_(config.filter),
       assist_(config.assist),
@@ -107,8 +108,8 @@ bool MapSegment::wants_halving() const {
 
 bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage& right) {
   const std::vector<SelectedPixel> pixels = vo_->select_pixels(frame, vo_->wanted_points());
-  const auto right_pyramid =
-      std::make_shared<const ImagePyramid>(preparation_.prepare_right(right, halvings_));
+  const auto right_pyramid = std::make_shared<const ImagePyramid>(
+      preparation_.prepare_right(right, halvings_, frame.rate));
   const std::vector<StaticMatch> matches =
       match_all(matcher_, *frame.pyramid, *right_pyramid, pixels);
   std::vector<StartPoint> points(pixels.size());
@@ -137,6 +138,7 @@ bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage&
   if (stereo()) vo_->use_static_residuals(rig());
   const bool at_once = right.stamp_offset_ns == 0;
   vo_->begin(frame, T_odom_left_start_, points, stereo() && at_once ? right_pyramid : nullptr);
+  readout_motion_.begin(*vo_->reference());
   // Matching errors are independent; what remains is common to all: the calibration, and where the
   // right camera went until its own exposure, as no motion is known yet.
   const double matching = 1.0 / std::sqrt(scale_information);
@@ -242,6 +244,23 @@ bool MapSegment::static_residuals() const {
   return stereo() || assisted;
 }
 
+TrackedFrame MapSegment::track(const MonoFrame& frame) {
+  return noted(vo_->track(frame, scale_status().locked ? config_.max_acceleration : 0.0));
+}
+
+TrackedFrame MapSegment::track_from(const MonoFrame& frame, const SE3& T_current_reference) {
+  return noted(vo_->track_from(frame, T_current_reference));
+}
+
+TrackedFrame MapSegment::track_again(const MonoFrame& frame, const TrackedFrame& before) {
+  return noted(vo_->track_again(frame, before));
+}
+
+TrackedFrame MapSegment::noted(TrackedFrame tracked) {
+  readout_motion_.note(tracked);
+  return tracked;
+}
+
 MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* right) {
   MappingOutcome out;
   const MapTimer timer = [this](MapStage stage, double seconds) {
@@ -258,7 +277,8 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
   if (use_right) {
     job.T_later_left = exposure_motion_.until(right->stamp_offset_ns);
     const auto start = std::chrono::steady_clock::now();
-    job.right = std::make_shared<const ImagePyramid>(preparation_.prepare_right(*right, halvings_));
+    job.right = std::make_shared<const ImagePyramid>(
+        preparation_.prepare_right(*right, halvings_, tracked.frame.rate));
     job.pyramid_seconds = seconds_since(start);
     // Depths of an unscaled map are no metres.
     const bool metric = filter_.locked();

@@ -9,6 +9,7 @@
 #include "sovo/odometry/exposure_motion.h"
 #include "sovo/odometry/frame_preparation.h"
 #include "sovo/odometry/odometry_output.h"
+#include "sovo/odometry/readout_motion.h"
 #include "sovo/odometry/stereo_odometry.h"
 #include "sovo/vo/monocular_backend.h"
 #include "sovo/vo/two_view_initializer.h"
@@ -84,9 +85,13 @@ class MapSegment {
   bool initialize_from_stereo(const MonoFrame& frame, const SideImage& right);
 
   /// Tracks a frame. The limit of acceleration counts once the map has metres.
-  TrackedFrame track(const MonoFrame& frame) {
-    return vo_->track(frame, scale_status().locked ? config_.max_acceleration : 0.0);
-  }
+  TrackedFrame track(const MonoFrame& frame);
+  /// The same from a known motion since the newest keyframe.
+  TrackedFrame track_from(const MonoFrame& frame, const SE3& T_current_reference);
+  /// Tracks the frame that was tracked last again, prepared with another rate.
+  TrackedFrame track_again(const MonoFrame& frame, const TrackedFrame& before);
+
+  const ReadoutMotion& readout_motion() const { return readout_motion_; }
 
   /// Maps a tracked frame. `right` may be null (missing): then there is no scale job.
   MappingOutcome map(const TrackedFrame& tracked, const SideImage* right);
@@ -108,6 +113,7 @@ class MapSegment {
   std::optional<MappingOutcome> take_start_outcome();
 
  private:
+  TrackedFrame noted(TrackedFrame tracked);
   bool initialize_from_two_views(const MonoFrame& frame, const SideImage* right);
   bool finish_two_views(const MonoFrame& frame, const SideImage* right);
   std::vector<StaticMatch> match_all(const StaticMatcher& matcher, const ImagePyramid& left,
@@ -142,7 +148,8 @@ class MapSegment {
 
   std::unique_ptr<MonocularBackend> vo_;
   StaticMatcher matcher_;
-  ExposureMotion exposure_motion_;
+  ExposureMotion exposure_motion_;  ///< Of the mapping thread.
+  ReadoutMotion readout_motion_;    ///< Of the tracking thread.
   ScaleOptimizer optimizer_;
   ScaleFilter filter_;
   StereoAssist assist_;

@@ -67,11 +67,11 @@ class StereoOdometry::Impl {
     SideImage right_side = frame.right;
     right_side.stamp_offset_ns = exposure_offset(frame);
     const SideImage* right = right_problem.empty() ? &right_side : nullptr;
-    const MonoFrame left = preparation_.prepare_left(frame, observer_, segment_->halvings());
+    const MonoFrame left = prepare_left(frame, segment_->readout_motion().expected(frame.stamp_ns));
     if (segment_->initialized()) {
-      follow(left, right, right_problem, &out);
+      follow(frame, left, right, right_problem, &out);
     } else if (segment_->initialize(left, right)) {
-      begin_map(left, &out);
+      begin_map(frame, left, &out);
     } else {
       out.reason = segment_->reason();
       if (segment_->wants_halving()) initialize_halved(frame, &out);
@@ -136,6 +136,7 @@ class StereoOdometry::Impl {
 
   void begin_segment(const SE3& T_odom_left) {
     set_segment(new_segment(next_segment_++, T_odom_left, 0));
+    first_frame_.reset();
     failures_ = 0;
     distance_ = 0.0;
     published_.reset();
@@ -149,7 +150,7 @@ class StereoOdometry::Impl {
       if (!segment->initialize_from_stereo(left, frame.right)) continue;
       const std::string why = segment_->stereo_problem();
       set_segment(std::move(segment));
-      begin_map(left, out);
+      begin_map(frame, left, out);
       out->reason = "images are reduced to 1/" + std::to_string(1 << halvings) +
                     " of their size, for in whole ones " + why;
       return;
@@ -157,12 +158,15 @@ class StereoOdometry::Impl {
   }
 
   /// The segment's first pose, after `initialize`.
-  void begin_map(const MonoFrame& left, OdometryOutput* out) {
+  void begin_map(const StereoFrame& frame, const MonoFrame& left, OdometryOutput* out) {
     if (auto start = segment_->take_start_outcome()) {
       publish_keyframes(*start);
       if (start->scale_job) finish_scale(*start->scale_job);
     }
     const auto reference = segment_->vo().reference();
+    const bool from_this_frame =
+        reference->stamp_ns == frame.stamp_ns && reference->keyframe_id == 0;
+    if (preparation_.has_rolling_shutter() && from_this_frame) first_frame_ = frame;
     TrackedFrame first;
     first.frame = left;
     first.reference = reference;
@@ -174,12 +178,90 @@ class StereoOdometry::Impl {
     out->state = state_of(*out, FrameTracking(), "");
   }
 
-  void follow(const MonoFrame& left, const SideImage* right, const std::string& right_problem,
-              OdometryOutput* out) {
+  MonoFrame prepare_left(const StereoFrame& frame, const Vec6& rate) {
+    return preparation_.prepare_left(frame, observer_, segment_->halvings(), rate);
+  }
+
+  /// Where a rolling shutter's image was prepared for another motion, it is prepared again.
+  TrackedFrame track(const StereoFrame& frame, const MonoFrame& left) {
+    constexpr int kMostRepeats = 3;
     TrackedFrame tracked;
     {
       const ScopedStage stage(observer_, Stage::kTracking);
       tracked = segment_->track(left);
+      if (!tracked.tracking.good && !left.rate.isZero(0.0)) {
+        // It may have been prepared for a motion that has just ended.
+        const TrackedFrame still = segment_->track(prepare_left(frame, Vec6::Zero()));
+        if (still.tracking.good) tracked = still;
+      }
+    }
+    for (int i = 0; i < kMostRepeats && tracked.tracking.good; ++i) {
+      const Vec6 rate = segment_->readout_motion().found();
+      if (!segment_->readout_motion().differs(rate, tracked)) break;
+      const TrackedFrame better = track_again(frame, rate, tracked);
+      if (better.tracking.good) tracked = better;
+    }
+    if (tracked.tracking.good) believe_image(frame, &tracked);
+    wait_for_steadiness(&tracked);
+    return tracked;
+  }
+
+  TrackedFrame track_again(const StereoFrame& frame, const Vec6& rate, const TrackedFrame& before) {
+    const MonoFrame again = prepare_left(frame, rate);
+    const ScopedStage stage(observer_, Stage::kTracking);
+    return segment_->track_again(again, before);
+  }
+
+  /// Where the image tells of another turning, it is prepared for that, and fits the better if that
+  /// is true.
+  void believe_image(const StereoFrame& frame, TrackedFrame* tracked) {
+    constexpr double kBetter = 0.95;
+    constexpr int kMostRepeats = 2;
+    for (int i = 0; i < kMostRepeats; ++i) {
+      const auto rate = segment_->readout_motion().contradicted(*tracked);
+      if (!rate) return;
+      const TrackedFrame other = track_again(frame, *rate, *tracked);
+      if (!other.tracking.good || other.tracking.rmse > kBetter * tracked->tracking.rmse) {
+        // What was noted of the other one is to be forgotten.
+        const TrackedFrame same = segment_->track_again(tracked->frame, *tracked);
+        if (same.tracking.good) *tracked = same;
+        return;
+      }
+      *tracked = other;
+    }
+  }
+
+  /// Others than frames in which the camera was knocked become keyframes, for as long as that can
+  /// wait.
+  void wait_for_steadiness(TrackedFrame* tracked) {
+    constexpr int kMostWaiting = 4;  // frames
+    if (!tracked->wants_keyframe) return;
+    const bool steady = segment_->readout_motion().is_steady(*tracked);
+    unsteady_ = steady ? 0 : unsteady_ + 1;
+    if (!steady && unsteady_ <= kMostWaiting) tracked->wants_keyframe = false;
+  }
+
+  /// A rolling shutter's motion is not known in a map's first frame, and its points would suffer
+  /// from that as long as they live: with the second frame it is, and the map begins once more.
+  TrackedFrame begin_again(const StereoFrame& first, const StereoFrame& frame,
+                           const TrackedFrame& tracked) {
+    const Vec6 rate = segment_->readout_motion().found();
+    auto segment = new_segment(segment_->index(), last_pose_, segment_->halvings());
+    if (!segment->initialize_from_stereo(prepare_left(first, rate), first.right)) return tracked;
+    segment->take_start_outcome();
+    TrackedFrame again =
+        segment->track_from(prepare_left(frame, rate), tracked.tracking.T_current_reference);
+    if (!again.tracking.good) return tracked;
+    set_segment(std::move(segment));
+    return again;
+  }
+
+  void follow(const StereoFrame& frame, const MonoFrame& left, const SideImage* right,
+              const std::string& right_problem, OdometryOutput* out) {
+    TrackedFrame tracked = track(frame, left);
+    if (first_frame_ && tracked.tracking.good) {
+      const StereoFrame first = *std::exchange(first_frame_, std::nullopt);
+      tracked = begin_again(first, frame, tracked);
     }
     if (map_broke_down() || !tracked.tracking.good) {
       lose(tracked.tracking, out);
@@ -343,6 +425,8 @@ class StereoOdometry::Impl {
 
   std::unique_ptr<MapSegment> segment_;
   std::uint32_t next_segment_ = 0;
+  std::optional<StereoFrame> first_frame_;  ///< Of a rolling shutter, until there is a second one.
+  int unsteady_ = 0;                        ///< Frames that would have been keyframes.
   TrajectoryRecorder recorder_;
   std::optional<std::int64_t> last_stamp_ns_;
   struct Published {

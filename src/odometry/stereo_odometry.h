@@ -94,7 +94,9 @@ struct StereoOdometryConfig {
   int lost_frames = 5;  ///< Frames in a row without a pose after which a new segment begins.
   double max_acceleration = 100.0;  ///< A pose that takes more is none [m/s^2]; 0: any is taken.
   bool exposure_motion = true;      ///< The motion between a pair's exposures is undone.
-  double scale_timeout_s = 3.0;     ///< Without an accepted scale: state SCALE_UNOBSERVED.
+  /// Of a rolling shutter, from the upmost row to the lowest; negative where that comes first.
+  double readout_ms = 0.0;
+  double scale_timeout_s = 3.0;  ///< Without an accepted scale: state SCALE_UNOBSERVED.
   DirectConfig vo;
   FeatureConfig features;
   ScaleOptimizerConfig scale;
@@ -126,6 +128,10 @@ struct StereoOdometryConfig {
       "a pose that takes more since the frames before is none [m/s^2]; 0: no limit");
     v("exposure_motion", exposure_motion,
       "cameras that are not triggered together: the motion between the exposures is undone");
+    v("readout_ms", readout_ms,
+      "rolling shutters: time from the exposure of the upmost row to that of the lowest [ms]; 0: "
+      "all "
+      "rows at once");
     v("scale_timeout_s", scale_timeout_s, "without an accepted scale: SCALE_UNOBSERVED [s]");
     v("vo", vo, "direct monocular odometry");
     v("features", features, "feature-based monocular odometry");

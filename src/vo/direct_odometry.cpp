@@ -32,6 +32,7 @@ std::unique_ptr<Keyframe> new_keyframe(std::uint32_t id, const MonoFrame& frame,
   k->stamp_ns = frame.stamp_ns;
   k->exposure_s = frame.exposure_s;
   k->pyramid = frame.pyramid;
+  k->rows = frame.rows;
   k->frozen_T_camera_world = T_world_camera.inverse();
   k->frozen_affine = affine;
   k->set_x(Vec8::Zero());
@@ -142,15 +143,17 @@ MapResult DirectOdometry::map(const TrackedFrame& tracked, const KeyframeStereo&
   const ReferenceKeyframe& reference = *tracked.reference;
   SE3 T_camera_reference = tracked.tracking.T_current_reference;
   T_camera_reference.translation() *= std::exp(log_scale() - reference.log_scale);
+  TrackedFrame found = tracked;
+  found.frame.rows.per_row *= std::exp(log_scale() - reference.log_scale);
   const SE3 T_world_camera =
       keyframes()[reference.keyframe_id].T_world_camera * T_camera_reference.inverse();
   const bool stale = reference.keyframe_id != window_.newest().id;
   {
     const StageTimer t(timer, MapStage::kTracing);
-    trace_all(tracked.frame, T_world_camera, tracked.affine);
+    trace_all(found.frame, T_world_camera, tracked.affine);
   }
   if (tracked.wants_keyframe && !stale) {
-    return make_keyframe(tracked, T_world_camera, stereo, timer);
+    return make_keyframe(found, T_world_camera, stereo, timer);
   }
   MapResult result;
   result.active_points = window_.num_active_points();
@@ -164,9 +167,13 @@ void DirectOdometry::trace_all(const MonoFrame& frame, const SE3& T_world_camera
   constexpr int kBlock = 64;
   for (int h = 0; h < window_.size(); ++h) {
     Keyframe& host = window_[h];
-    const HostGeometry geometry =
-        host_geometry(camera_, T_world_camera.inverse() * host.T_world_camera(),
+    const SE3 T_camera_host = T_world_camera.inverse() * host.T_world_camera();
+    HostGeometry geometry =
+        host_geometry(camera_, T_camera_host,
                       brightness_transfer(host.affine, host.exposure_s, affine, frame.exposure_s));
+    geometry.rows = PairRowShift(T_camera_host, host.rows, frame.rows);
+    geometry.K = camera_.matrix().cast<float>();
+    geometry.t = T_camera_host.translation().cast<float>();
     const int total = static_cast<int>(host.immature.size());
     pool_->run((total + kBlock - 1) / kBlock, [&](int block) {
       for (int i = block * kBlock; i < std::min(total, (block + 1) * kBlock); ++i) {

@@ -37,6 +37,7 @@ class DirectOdometry final : public MonocularBackend {
   void begin(const MonoFrame& frame, const SE3& T_world_camera,
              const std::vector<StartPoint>& points, const ImagePyramidPtr& right) override;
   TrackedFrame track(const MonoFrame& frame, double max_acceleration) override;
+  TrackedFrame track_again(const MonoFrame& frame, const TrackedFrame& before) override;
   TrackedFrame track_from(const MonoFrame& frame, const SE3& T_current_reference) override;
   /// Traces the immature points, and makes the frame a keyframe when it wants to be one and its
   /// reference is still the newest.
@@ -70,13 +71,16 @@ class DirectOdometry final : public MonocularBackend {
   std::vector<WindowPose> window_poses() const;
   void take_snapshot();
   TrackedFrame track_hypotheses(const MonoFrame& frame,
-                                std::shared_ptr<const TrackingReference> reference);
+                                std::shared_ptr<const TrackingReference> reference, int turn_level);
   void find_motion_hypotheses(const TrackingReference& reference, const MonoFrame& frame,
                               double max_acceleration);
   /// The tracker's best of these motions; not good when the camera cannot be there.
   TrackingResult track_from_any(const TrackingReference& reference, const MonoFrame& frame,
                                 std::span<const SE3> hypotheses,
                                 const std::optional<SE3>& expected);
+  std::optional<ReadoutTurn> readout_turn(const TrackingReference& reference,
+                                          const MonoFrame& frame, const TrackingResult& tracked,
+                                          int level) const;
   /// From the likely motions, and when none fits as expected, from those of a camera that was
   /// knocked.
   TrackingResult align(const TrackingReference& reference, const MonoFrame& frame);
@@ -110,6 +114,7 @@ class DirectOdometry final : public MonocularBackend {
   // Tracking side.
   CoarseTracker tracker_;
   MotionModel motion_;
+  MotionModel motion_before_;  ///< As the frame tracked last found it.
   /// The motion since the reference when it is as it was between the past frames.
   std::optional<KnownMotion> known_motion_;
   std::vector<SE3> hypotheses_;  ///< T_camera_reference of the new frame, the likeliest first.

@@ -243,10 +243,22 @@ bool make_immature_point(const ImageF& image, float u, float v, std::uint8_t typ
   return true;
 }
 
-TraceState trace(const ImageF& image, const HostGeometry& g, const PointConfig& config,
-                 ImmaturePoint* point) {
+namespace {
+
+/// With what the rows of a rolling shutter do to a point of this depth.
+HostGeometry moved_by_rows(const HostGeometry& g, const ImageF& image, const ImmaturePoint& p) {
+  const float rho = std::isfinite(p.rho_max) ? 0.5F * (p.rho_min + p.rho_max) : p.rho_min;
+  const Eigen::Vector3f seen = plain_product(g.KRKi, Eigen::Vector3f(p.u, p.v, 1.0F)) + g.Kt * rho;
+  const float row = seen.z() > 0.0F ? seen.y() / seen.z() : g.rows.middle();
+  HostGeometry out = g;
+  const auto moved = g.rows.at(p.v, std::clamp(row, 0.0F, static_cast<float>(image.height())));
+  out.Kt = plain_product(g.K, moved.applied(g.t));
+  return out;
+}
+
+TraceState search(const ImageF& image, const HostGeometry& g, const PointConfig& config,
+                  ImmaturePoint* point) {
   ImmaturePoint& p = *point;
-  if (p.state == TraceState::kOutOfView) return p.state;
   Segment s;
   const TraceState early = find_segment(image, g, config, p, &s);
   if (early == TraceState::kSkipped) p.interval_px = s.length;
@@ -299,6 +311,15 @@ TraceState trace(const ImageF& image, const HostGeometry& g, const PointConfig& 
   }
   p.interval_px = 2.0F * error;
   return finish(&p, TraceState::kGood);
+}
+
+}  // namespace
+
+TraceState trace(const ImageF& image, const HostGeometry& geometry, const PointConfig& config,
+                 ImmaturePoint* point) {
+  if (point->state == TraceState::kOutOfView) return point->state;
+  if (geometry.rows.none()) return search(image, geometry, config, point);
+  return search(image, moved_by_rows(geometry, image, *point), config, point);
 }
 
 }  // namespace sovo

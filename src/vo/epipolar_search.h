@@ -16,6 +16,9 @@ struct HostGeometry {
   Eigen::Matrix3f KRKi;
   Eigen::Vector3f Kt;
   float gain = 1.0F, bias = 0.0F;
+  PairRowShift rows;
+  Eigen::Matrix3f K = Eigen::Matrix3f::Identity();
+  Eigen::Vector3f t = Eigen::Vector3f::Zero();  ///< Kt is K times it.
 };
 
 HostGeometry host_geometry(const CameraModel& camera, const SE3& T_target_host,

@@ -39,10 +39,16 @@ void geometric_jacobian(const CameraModel& camera, const PairGeometry& g,
   const float x = at.x;
   const float y = at.y;
   const float rho_target = at.rho * at.iz;
-  r->du_rho = at.iz * (g.frozen_t.x() - g.frozen_t.z() * x) * fx;
-  r->dv_rho = at.iz * (g.frozen_t.y() - g.frozen_t.z() * y) * fy;
+  const Eigen::Vector3f t = at.rows.applied(g.frozen_t);
+  r->du_rho = at.iz * (t.x() - t.z() * x) * fx;
+  r->dv_rho = at.iz * (t.y() - t.z() * y) * fy;
   r->du = {rho_target * fx, 0.0F, -rho_target * x * fx, -x * y * fx, (1.0F + x * x) * fx, -y * fx};
   r->dv = {0.0F, rho_target * fy, -rho_target * y * fy, -(1.0F + y * y) * fy, x * y * fy, x * fy};
+  if (g.rows.none()) return;
+  for (auto* d : {&r->du, &r->dv}) {
+    const Eigen::Vector3f chained = at.rows.chain({(*d)[0], (*d)[1], (*d)[2]});
+    std::copy_n(chained.data(), 3, d->begin());
+  }
 }
 
 /// cross = J_state^T J_rho from the Gram matrix and the geometric Jacobian.
@@ -56,6 +62,14 @@ void fill_cross(LinearizedResidual* r) {
   r->cross[7] = r->gram[tri(0, 3)] * r->du_rho + r->gram[tri(1, 3)] * r->dv_rho;
 }
 
+/// By the row in which the point is seen; that it is seen in another row for this is less than a
+/// thousandth of it.
+PairRowShift::Displacement row_shift(const PairGeometry& g, const Point& point,
+                                     const Eigen::Vector3f& seen, int height) {
+  const float row = seen.z() > 0.0F ? seen.y() / seen.z() : g.rows.middle();
+  return g.rows.at(point.v, std::clamp(row, 0.0F, static_cast<float>(height)));
+}
+
 }  // namespace
 
 void project_pattern(const Window& window, int host, int target, const Point& point,
@@ -65,12 +79,21 @@ void project_pattern(const Window& window, int host, int target, const Point& po
   PatternProjection& out = *projection;
   out.rho = static_cast<float>(point.rho);
   const Eigen::Vector3f ray(point.u, point.v, 1.0F);
-  const Eigen::Vector3f frozen = plain_product(g.frozen_RKi, ray) + g.frozen_t * out.rho;
+  const Eigen::Vector3f turned = plain_product(g.KRKi, ray);
+  Eigen::Vector3f centre = turned + g.Kt * out.rho;
+  Eigen::Vector3f frozen_t = g.frozen_t;
+  out.rows = {};
+  if (!g.rows.none()) {
+    out.rows = row_shift(g, point, centre, image.height());
+    const Eigen::Matrix3f K = window.camera().matrix().cast<float>();
+    centre = turned + plain_product(K, out.rows.applied(g.t)) * out.rho;
+    frozen_t = out.rows.applied(g.frozen_t);
+  }
+  const Eigen::Vector3f frozen = plain_product(g.frozen_RKi, ray) + frozen_t * out.rho;
   out.iz = 1.0F / frozen.z();
   out.x = frozen.x() * out.iz;
   out.y = frozen.y() * out.iz;
 
-  const Eigen::Vector3f centre = plain_product(g.KRKi, ray) + g.Kt * out.rho;
   const PatternWarp warp = {{centre.x(), centre.y(), centre.z()},
                             {g.KRKi(0, 0), g.KRKi(1, 0), g.KRKi(2, 0)},
                             {g.KRKi(0, 1), g.KRKi(1, 1), g.KRKi(2, 1)},

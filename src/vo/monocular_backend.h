@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "sovo/geometry/row_shift.h"
 #include "sovo/geometry/stereo_rig.h"
 #include "sovo/image/pyramid.h"
 #include "sovo/vo/brightness.h"
@@ -22,6 +23,10 @@ struct MonoFrame {
   std::int64_t stamp_ns = 0;
   double exposure_s = 0.0;  ///< 0: unknown.
   ImagePyramidPtr pyramid;
+  /// Of a rolling shutter: how the camera moved while the image was read out, log(T_later_earlier)
+  /// a second (translation, rotation), as its images were prepared with. What it turned is undone.
+  Vec6 rate = Vec6::Zero();
+  RowShift rows;  ///< Where points come to lie by the way that is left.
 };
 
 /// First depth of a pixel, from wherever it is known.
@@ -66,6 +71,12 @@ struct ReferenceKeyframe {
 /// Multiplies all lengths by `scale`, the newest keyframe's centre fixed.
 void rescale(double scale, ReferenceKeyframe* reference);
 
+/// How a camera turned while its image was read out, as the image itself tells.
+struct ReadoutTurn {
+  Vec3 rate = Vec3::Zero();         ///< As the rotation in MonoFrame::rate [rad/s].
+  Mat3 information = Mat3::Zero();  ///< [s^2 / rad^2]
+};
+
 /// How a frame was tracked.
 struct FrameTracking {
   bool good = false;
@@ -74,6 +85,7 @@ struct FrameTracking {
   double rmse = 0.0;          ///< Residual [grey levels, or px where features are followed].
   double inlier_ratio = 0.0;  ///< Share of what is compared in view that agrees.
   int inliers = 0;
+  std::optional<ReadoutTurn> readout_turn;  ///< Of a rolling shutter, where it could be measured.
 };
 
 /// What a backend keeps of a frame that was tracked until it is mapped.
@@ -156,6 +168,10 @@ class MonocularBackend {
   /// when only a pose fits that takes more than `max_acceleration` since the frames before [the
   /// map's unit of length / s^2]; 0: no such limit is known.
   virtual TrackedFrame track(const MonoFrame& frame, double max_acceleration) = 0;
+
+  /// Tracks the frame that was tracked last once more, as it was prepared anew; what was noted of
+  /// it before is replaced.
+  virtual TrackedFrame track_again(const MonoFrame& frame, const TrackedFrame& before) = 0;
 
   /// The same from a known motion since the newest keyframe.
   virtual TrackedFrame track_from(const MonoFrame& frame, const SE3& T_current_reference) = 0;

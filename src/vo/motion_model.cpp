@@ -20,6 +20,7 @@ bool is_reachable(const KnownMotion& known, const SE3& T_current_reference) {
 
 void MotionModel::note(const ReferenceKeyframe& reference, const SE3& T_camera_reference,
                        std::int64_t stamp_ns) {
+  if (!past_.empty() && past_.back().stamp_ns == stamp_ns) past_.pop_back();
   past_.push_back({T_camera_reference, reference.log_scale, reference.keyframe_id, stamp_ns});
   if (past_.size() > 2) past_.erase(past_.begin());
 }

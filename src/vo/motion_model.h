@@ -37,7 +37,7 @@ class MotionModel {
  public:
   void clear() { past_.clear(); }
 
-  /// Notes where a frame was found.
+  /// Notes where a frame was found; noted again, the same frame was found there instead.
   void note(const ReferenceKeyframe& reference, const SE3& T_camera_reference,
             std::int64_t stamp_ns);
 

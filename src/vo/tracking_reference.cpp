@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "sovo/image/halving.h"
+
 namespace sovo {
 
 namespace {
@@ -251,6 +253,7 @@ TrackingReference build_tracking_reference(const Window& window, int num_levels)
   ref.stamp_ns = newest.stamp_ns;
   ref.exposure_s = newest.exposure_s;
   ref.affine = newest.affine;
+  ref.rows = newest.rows;
   ref.T_world_camera = newest.T_world_camera();
   ref.levels.resize(static_cast<std::size_t>(num_levels));
 
@@ -274,8 +277,38 @@ TrackingReference build_tracking_reference(const Window& window, int num_levels)
   return ref;
 }
 
+TrackingReference moved_by_rows(const TrackingReference& reference, const RowShift& rows,
+                                const SE3& T_current_reference) {
+  TrackingReference out = reference;
+  const PairRowShift shift(T_current_reference, reference.rows, rows);
+  const Eigen::Matrix3f R = T_current_reference.rotation_matrix().cast<float>();
+  const Eigen::Vector3f t = T_current_reference.translation().cast<float>();
+  for (std::size_t l = 0; l < out.levels.size(); ++l) {
+    ReferenceLevel& level = out.levels[l];
+    const auto fx = static_cast<float>(level.camera.fx), fy = static_cast<float>(level.camera.fy);
+    const auto cx = static_cast<float>(level.camera.cx), cy = static_cast<float>(level.camera.cy);
+    const auto height = static_cast<float>(level.camera.height);
+    const int halvings = static_cast<int>(l);
+    for (std::size_t i = 0; i < level.size(); ++i) {
+      const float row = level.v[i];
+      Eigen::Vector3f p((level.u[i] - cx) / fx, (row - cy) / fy, 1.0F);
+      const Eigen::Vector3f seen = R * p + level.rho[i] * t;
+      const float seen_row =
+          seen.z() > 0.0F ? std::clamp(fy * seen.y() / seen.z() + cy, 0.0F, height) : row;
+      const auto moved = shift.at(from_halved(row, halvings), from_halved(seen_row, halvings));
+      p += level.rho[i] * (R.transpose() * (moved.applied(t) - t));
+      if (!(p.z() > 0.0F)) continue;
+      level.u[i] = fx * p.x() / p.z() + cx;
+      level.v[i] = fy * p.y() / p.z() + cy;
+      level.rho[i] /= p.z();
+    }
+  }
+  return out;
+}
+
 TrackingReference rescaled(const TrackingReference& reference, double scale) {
   TrackingReference out = reference;
+  out.rows.per_row *= scale;
   rescale(scale, &out);
   for (ReferenceLevel& level : out.levels) {
     for (float& rho : level.rho) rho /= static_cast<float>(scale);

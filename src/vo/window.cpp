@@ -98,6 +98,8 @@ void Window::update_geometry() {
       g.frozen_RKi = (T0.rotation_matrix() * K_inverse).cast<float>();
       g.frozen_t = T0.translation().cast<float>();
 
+      g.rows = PairRowShift(T0, host.rows, target.rows);
+
       const BrightnessTransfer now =
           brightness_transfer(host.affine, host.exposure_s, target.affine, target.exposure_s);
       const BrightnessTransfer frozen = brightness_transfer(
@@ -160,6 +162,7 @@ void Window::apply_similarity(double scale) {
     SE3& T0 = k->frozen_T_camera_world;
     T0.translation() = scale * T0.translation() - (1.0 - scale) * (T0.rotation() * centre);
     k->set_x(s.asDiagonal() * k->x);
+    k->rows.per_row *= scale;
     for (Point& p : k->points) {
       p.rho /= scale;
       p.hessian *= scale * scale;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "sovo/geometry/camera_model.h"
+#include "sovo/geometry/row_shift.h"
 #include "sovo/geometry/se3.h"
 #include "sovo/geometry/stereo_rig.h"
 #include "sovo/image/pyramid.h"
@@ -86,6 +87,8 @@ struct Keyframe {
   SE3 T_camera_world;  ///< exp(x) * frozen.
   Affine affine;       ///< frozen + x.
 
+  RowShift rows;  ///< Of a rolling shutter, in the map's unit.
+
   double outlier_threshold = 0.0;  ///< Energy of a whole pattern.
   int points_hosted = 0;           ///< Ever active points of this host.
   int points_gone = 0;             ///< Of them, marginalized or dropped.
@@ -118,6 +121,7 @@ struct PairGeometry {
   float gain = 1.0F, bias = 0.0F;  ///< Current brightness transfer.
   float frozen_gain = 1.0F;
   float frozen_host_b = 0.0F;
+  PairRowShift rows;      ///< By the linearization points.
   Mat8 adjoint_host;      ///< d (relative state) / d x_host; that of x_target is the identity.
   double distance = 0.0;  ///< Between the camera centres [m].
 };

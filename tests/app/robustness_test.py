@@ -61,6 +61,13 @@ class Robustness(SimTest):
             truth, live = self.fly("hall", *part, right_offset_ms=25)
             self.expect_whole(truth, live, 0.1)
 
+    def test_rows_are_exposed_one_after_the_other(self):
+        # Taken as of one instant 40 to 70 mm off; the race is knocked after two seconds.
+        rolling = ("--set", "readout_ms=16")
+        for part in (("--trajectory", "race", "--frames", 90), ("--frames", 100, "--reverse")):
+            truth, live = self.fly("hall", *part, *rolling, readout_ms=16)
+            self.expect_whole(truth, live, 0.03)
+
     def test_turbid_water_leaves_a_fifth_of_the_contrast(self):
         self.expect_whole(*self.fly("pool", "--frames", 80, veil=0.8), 0.05)
 

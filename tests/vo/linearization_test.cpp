@@ -49,7 +49,11 @@ class WindowJacobian : public ::testing::Test {
     const SE3 T = SE3::exp(state.head<6>()) * window_[1].frozen_T_camera_world *
                   window_[0].frozen_T_camera_world.inverse();
     const Vec3 ray((u - c.cx) / c.fx, (v - c.cy) / c.fy, 1.0);
-    const Vec3 p = T.rotation_matrix() * ray + T.translation() * state[8];
+    const Vec3& moved = T.translation();
+    const Vec3 t = (1.0 + rows_.share) * moved +
+                   rows_.along.cast<double>().dot(moved) * rows_.across.cast<double>() +
+                   rows_.fixed.cast<double>();
+    const Vec3 p = T.rotation_matrix() * ray + t * state[8];
     return {c.fx * p.x() / p.z() + c.cx, c.fy * p.y() / p.z() + c.cy};
   }
 
@@ -130,7 +134,18 @@ class WindowJacobian : public ::testing::Test {
     (*b)[8] = gradient;
   }
 
+  /// The images are read out row after row while the camera moves on.
+  void roll() {
+    const double middle = 0.5 * (window_.camera().height - 1);
+    window_[0].rows = {.per_row = Vec3(2e-4, 1e-4, 5e-4), .middle = middle};
+    window_[1].rows = {.per_row = Vec3(-1e-4, 2e-4, 6e-4), .middle = middle};
+    window_.update_geometry();
+    const Vec2 seen = project(point().u, point().v, here());
+    rows_ = window_.pair(0, 1).rows.at(point().v, static_cast<float>(seen.y()));
+  }
+
   WaveImage image_{0.5};
+  PairRowShift::Displacement rows_;
   WindowConfig config_;
   Window window_;
   LinearizedResidual linearized_;
@@ -156,6 +171,39 @@ TEST_F(WindowJacobian, GeometryAgreesWithCentralDifferencesAtTheCentrePixel) {
   EXPECT_NEAR(r.dv_rho, J(1, 8), 1e-4 * J.col(8).norm());
   EXPECT_NEAR(r.centre_u, f(here()).x(), 1e-3);
   EXPECT_NEAR(r.centre_v, f(here()).y(), 1e-3);
+}
+
+TEST_F(WindowJacobian, GeometryOfARollingShutterAgreesWithCentralDifferences) {
+  const Vec2 at_once = project(point().u, point().v, here());
+  roll();
+  linearize_now();
+  const auto f = [&](const Vec9& s) { return project(point().u, point().v, s); };
+  EXPECT_GT((f(here()) - at_once).norm(), 0.5) << "or the rows do nothing";
+  const Eigen::Matrix<double, 2, 9> J = central_differences<2, 9>(f, here());
+  const LinearizedResidual& r = linearized_;
+  // A target that turns takes the part across along or leaves it: that is not told apart.
+  const double turned = window_.camera().fx * point().rho * rows_.across.norm();
+  for (std::size_t k = 0; k < 6; ++k) {
+    const auto c = static_cast<Eigen::Index>(k);
+    const double tolerance = 3e-4 * J.col(c).norm() + (k < 3 ? 0.0 : turned);
+    EXPECT_NEAR(r.du[k], J(0, c), tolerance) << "state " << k;
+    EXPECT_NEAR(r.dv[k], J(1, c), tolerance) << "state " << k;
+  }
+  EXPECT_NEAR(r.du_rho, J(0, 8), 3e-4 * J.col(8).norm());
+  EXPECT_NEAR(r.dv_rho, J(1, 8), 3e-4 * J.col(8).norm());
+  EXPECT_NEAR(r.centre_u, f(here()).x(), 1e-2);
+  EXPECT_NEAR(r.centre_v, f(here()).y(), 1e-2);
+}
+
+TEST_F(WindowJacobian, RowsGrowWithTheMap) {
+  roll();
+  linearize_now();
+  const LinearizedResidual before = linearized_;
+  window_.apply_similarity(1.9);
+  window_.update_geometry();
+  linearize_now();
+  EXPECT_NEAR(linearized_.centre_u, before.centre_u, 1e-3);
+  EXPECT_NEAR(linearized_.centre_v, before.centre_v, 1e-3);
 }
 
 TEST_F(WindowJacobian, WholeLinearizationAgreesWithCentralDifferences) {

@@ -14,12 +14,20 @@ namespace sovo {
 
 TrackedFrame FeatureOdometry::track(const MonoFrame& frame, double max_acceleration) {
   auto reference = tracking_reference();
+  motion_before_ = motion_;
   const MotionModel::Forecast forecast =
       motion_.forecast(*reference, frame.stamp_ns, max_acceleration);
   return track_against(frame, std::move(reference), forecast);
 }
 
+TrackedFrame FeatureOdometry::track_again(const MonoFrame& frame, const TrackedFrame& before) {
+  motion_ = motion_before_;
+  return track_against(frame, std::static_pointer_cast<const FeatureReference>(before.reference),
+                       {before.tracking.T_current_reference, std::nullopt});
+}
+
 TrackedFrame FeatureOdometry::track_from(const MonoFrame& frame, const SE3& T_current_reference) {
+  motion_before_ = motion_;
   return track_against(frame, tracking_reference(), {T_current_reference, std::nullopt});
 }
 

@@ -31,6 +31,7 @@ class FeatureOdometry final : public MonocularBackend {
   void begin(const MonoFrame& frame, const SE3& T_world_camera,
              const std::vector<StartPoint>& points, const ImagePyramidPtr& right) override;
   TrackedFrame track(const MonoFrame& frame, double max_acceleration) override;
+  TrackedFrame track_again(const MonoFrame& frame, const TrackedFrame& before) override;
   TrackedFrame track_from(const MonoFrame& frame, const SE3& T_current_reference) override;
   MapResult map(const TrackedFrame& tracked, const KeyframeStereo& stereo,
                 const MapTimer& timer) override;
@@ -90,6 +91,7 @@ class FeatureOdometry final : public MonocularBackend {
   // Tracking side.
   FeatureTracker tracker_;
   MotionModel motion_;
+  MotionModel motion_before_;  ///< As the frame tracked last found it.
   ImagePyramidPtr last_pyramid_;
 };
 

@@ -24,8 +24,6 @@ class ExposureMotion {
   /// log(T_later_earlier) a second, (translation, rotation), as it is `seconds` after the newest
   /// frame, in the unit of that frame's map. Zero while no two frames are known.
   Vec6 rate_after(double seconds) const;
-  /// The mean rate until the frame before the newest one.
-  Vec6 rate_before() const { return before_ ? before_->rate : Vec6(Vec6::Zero()); }
 
  private:
   /// Between two frames.

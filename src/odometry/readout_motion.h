@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 
 #include "sovo/odometry/exposure_motion.h"
 #include "sovo/odometry/frame_preparation.h"
@@ -26,16 +25,11 @@ class ReadoutMotion {
   /// As it was in the frame that was tracked last, as that and the frames before tell.
   Vec6 found() const { return motion_.rate_after(0.0); }
 
-  /// What it may have been instead, where the image contradicts by more than its noise and a pixel:
-  /// a camera that was knocked turned as only the image knows, and went on as before.
-  std::optional<Vec6> contradicted(const TrackedFrame& tracked) const;
-
   /// Whether the image was prepared for another motion than that.
   bool differs(const Vec6& found, const TrackedFrame& tracked) const;
 
-  /// Whether one rate describes the motion: what was read out while the camera was knocked has a
-  /// shape that none undoes.
-  bool is_steady(const TrackedFrame& tracked) const;
+  /// Whether the camera turned about as was expected: else it was knocked.
+  bool is_steady(const Vec6& expected) const;
 
  private:
   const FramePreparation& preparation_;

@@ -182,61 +182,36 @@ class StereoOdometry::Impl {
     return preparation_.prepare_left(frame, observer_, segment_->halvings(), rate);
   }
 
-  /// Where a rolling shutter's image was prepared for another motion, it is prepared again.
+  /// `before`: the same frame as it was tracked when it was prepared for another motion, or null.
+  TrackedFrame track(const MonoFrame& left, const TrackedFrame* before) {
+    const ScopedStage stage(observer_, Stage::kTracking);
+    return before == nullptr ? segment_->track(left) : segment_->track_again(left, *before);
+  }
+
+  /// Where a rolling shutter's image was prepared for another motion than is found, it is prepared
+  /// again. (More often changes nothing to the better.)
   TrackedFrame track(const StereoFrame& frame, const MonoFrame& left) {
-    constexpr int kMostRepeats = 3;
-    TrackedFrame tracked;
-    {
-      const ScopedStage stage(observer_, Stage::kTracking);
-      tracked = segment_->track(left);
-      if (!tracked.tracking.good && !left.rate.isZero(0.0)) {
-        // It may have been prepared for a motion that has just ended.
-        const TrackedFrame still = segment_->track(prepare_left(frame, Vec6::Zero()));
-        if (still.tracking.good) tracked = still;
-      }
+    TrackedFrame tracked = track(left, nullptr);
+    if (!tracked.tracking.good && !left.rate.isZero(0.0)) {
+      // It may have been prepared for a motion that has just ended.
+      tracked = track(prepare_left(frame, Vec6::Zero()), nullptr);
     }
-    for (int i = 0; i < kMostRepeats && tracked.tracking.good; ++i) {
-      const Vec6 rate = segment_->readout_motion().found();
-      if (!segment_->readout_motion().differs(rate, tracked)) break;
-      const TrackedFrame better = track_again(frame, rate, tracked);
+    if (!tracked.tracking.good) return tracked;
+    const ReadoutMotion& motion = segment_->readout_motion();
+    if (motion.differs(motion.found(), tracked)) {
+      const TrackedFrame better = track(prepare_left(frame, motion.found()), &tracked);
       if (better.tracking.good) tracked = better;
     }
-    if (tracked.tracking.good) believe_image(frame, &tracked);
-    wait_for_steadiness(&tracked);
+    wait_for_steadiness(left.rate, &tracked);
     return tracked;
   }
 
-  TrackedFrame track_again(const StereoFrame& frame, const Vec6& rate, const TrackedFrame& before) {
-    const MonoFrame again = prepare_left(frame, rate);
-    const ScopedStage stage(observer_, Stage::kTracking);
-    return segment_->track_again(again, before);
-  }
-
-  /// Where the image tells of another turning, it is prepared for that, and fits the better if that
-  /// is true.
-  void believe_image(const StereoFrame& frame, TrackedFrame* tracked) {
-    constexpr double kBetter = 0.95;
-    constexpr int kMostRepeats = 2;
-    for (int i = 0; i < kMostRepeats; ++i) {
-      const auto rate = segment_->readout_motion().contradicted(*tracked);
-      if (!rate) return;
-      const TrackedFrame other = track_again(frame, *rate, *tracked);
-      if (!other.tracking.good || other.tracking.rmse > kBetter * tracked->tracking.rmse) {
-        // What was noted of the other one is to be forgotten.
-        const TrackedFrame same = segment_->track_again(tracked->frame, *tracked);
-        if (same.tracking.good) *tracked = same;
-        return;
-      }
-      *tracked = other;
-    }
-  }
-
-  /// Others than frames in which the camera was knocked become keyframes, for as long as that can
-  /// wait.
-  void wait_for_steadiness(TrackedFrame* tracked) {
+  /// What was read out while the camera was knocked has a shape that no one rate undoes: others
+  /// than such frames become keyframes, for as long as that can wait.
+  void wait_for_steadiness(const Vec6& expected_rate, TrackedFrame* tracked) {
     constexpr int kMostWaiting = 4;  // frames
     if (!tracked->wants_keyframe) return;
-    const bool steady = segment_->readout_motion().is_steady(*tracked);
+    const bool steady = segment_->readout_motion().is_steady(expected_rate);
     unsteady_ = steady ? 0 : unsteady_ + 1;
     if (!steady && unsteady_ <= kMostWaiting) tracked->wants_keyframe = false;
   }
@@ -426,7 +401,7 @@ class StereoOdometry::Impl {
   std::unique_ptr<MapSegment> segment_;
   std::uint32_t next_segment_ = 0;
   std::optional<StereoFrame> first_frame_;  ///< Of a rolling shutter, until there is a second one.
-  int unsteady_ = 0;                        ///< Frames that would have been keyframes.
+  int unsteady_ = 0;                        ///< Frames in a row that would have been keyframes.
   TrajectoryRecorder recorder_;
   std::optional<std::int64_t> last_stamp_ns_;
   struct Published {

@@ -71,16 +71,13 @@ class DirectOdometry final : public MonocularBackend {
   std::vector<WindowPose> window_poses() const;
   void take_snapshot();
   TrackedFrame track_hypotheses(const MonoFrame& frame,
-                                std::shared_ptr<const TrackingReference> reference, int turn_level);
+                                std::shared_ptr<const TrackingReference> reference);
   void find_motion_hypotheses(const TrackingReference& reference, const MonoFrame& frame,
                               double max_acceleration);
   /// The tracker's best of these motions; not good when the camera cannot be there.
   TrackingResult track_from_any(const TrackingReference& reference, const MonoFrame& frame,
                                 std::span<const SE3> hypotheses,
                                 const std::optional<SE3>& expected);
-  std::optional<ReadoutTurn> readout_turn(const TrackingReference& reference,
-                                          const MonoFrame& frame, const TrackingResult& tracked,
-                                          int level) const;
   /// From the likely motions, and when none fits as expected, from those of a camera that was
   /// knocked.
   TrackingResult align(const TrackingReference& reference, const MonoFrame& frame);

@@ -5,17 +5,12 @@
 #include "sovo/vo/direct_odometry.h"
 #include "sovo/vo/keyframe_policy.h"
 #include "sovo/vo/motion_hypotheses.h"
-#include "sovo/vo/row_turn.h"
 
 namespace sovo {
 
 namespace {
 
 constexpr std::size_t kMotionsKept = 4;
-/// Pyramid levels at which the turning of a rolling shutter's camera is measured: in an image that
-/// was prepared for the expected one, and in one prepared anew.
-constexpr int kFirstTurnLevel = 2;
-constexpr int kTurnLevel = 1;
 /// Of the mean depth, of a frame of which no motion is known.
 constexpr std::array kUnknownShares = {0.02, 0.04, 0.07, 0.11, 0.16, 0.21, 0.27, 0.33, 0.4, 0.48};
 
@@ -97,21 +92,21 @@ TrackedFrame DirectOdometry::track(const MonoFrame& frame, double max_accelerati
   auto ref = tracking_reference();
   motion_before_ = motion_;
   find_motion_hypotheses(*ref, frame, max_acceleration);
-  return track_hypotheses(frame, std::move(ref), kFirstTurnLevel);
+  return track_hypotheses(frame, std::move(ref));
 }
 
 TrackedFrame DirectOdometry::track_again(const MonoFrame& frame, const TrackedFrame& before) {
   motion_ = motion_before_;
   hypotheses_ = {before.tracking.T_current_reference};
-  return track_hypotheses(
-      frame, std::static_pointer_cast<const TrackingReference>(before.reference), kTurnLevel);
+  return track_hypotheses(frame,
+                          std::static_pointer_cast<const TrackingReference>(before.reference));
 }
 
 TrackedFrame DirectOdometry::track_from(const MonoFrame& frame, const SE3& T_current_reference) {
   motion_before_ = motion_;
   known_motion_.reset();
   hypotheses_ = {T_current_reference};
-  return track_hypotheses(frame, tracking_reference(), kFirstTurnLevel);
+  return track_hypotheses(frame, tracking_reference());
 }
 
 TrackedHistory DirectOdometry::compare_with_past(const TrackingReference& reference,
@@ -133,36 +128,15 @@ TrackedHistory DirectOdometry::compare_with_past(const TrackingReference& refere
   return out;
 }
 
-std::optional<ReadoutTurn> DirectOdometry::readout_turn(const TrackingReference& reference,
-                                                        const MonoFrame& frame,
-                                                        const TrackingResult& tracked,
-                                                        int level) const {
-  level = std::min(
-      {level, static_cast<int>(reference.levels.size()) - 1, frame.pyramid->num_levels() - 1});
-  auto turn = measure_row_turn(
-      reference.levels[static_cast<std::size_t>(level)], frame.pyramid->level(level),
-      tracked.T_current_reference,
-      brightness_transfer(reference.affine, reference.exposure_s, tracked.affine, frame.exposure_s),
-      config_.tracker.huber, frame.rows, level);
-  if (!turn) return turn;
-  turn->rate += frame.rate.tail<3>();
-  turn->information /= frame_variance(tracked.rmse, reference.gradient_scatter);
-  return turn;
-}
-
 TrackedFrame DirectOdometry::track_hypotheses(const MonoFrame& frame,
-                                              std::shared_ptr<const TrackingReference> reference,
-                                              int turn_level) {
+                                              std::shared_ptr<const TrackingReference> reference) {
   const TrackingReference& ref = *reference;
   TrackedFrame out;
   out.frame = frame;
-  const bool rolling = frame.rows.seconds != 0.0;
-  std::optional<TrackingReference> moved;
-  if (rolling) moved = moved_by_rows(ref, frame.rows, hypotheses_.front());
-  TrackingResult tracking = align(rolling ? *moved : ref, frame);
-  if (rolling && tracking.good) {
-    tracking.readout_turn = readout_turn(*moved, frame, tracking, turn_level);
-  }
+  const bool rolling = !ref.rows.none() || !frame.rows.none();
+  const TrackingResult tracking =
+      rolling ? align(moved_by_rows(ref, frame.rows, hypotheses_.front()), frame)
+              : align(ref, frame);
   out.tracking = static_cast<const FrameTracking&>(tracking);
   out.reference = std::move(reference);
   if (!tracking.good) return out;

@@ -71,12 +71,6 @@ struct ReferenceKeyframe {
 /// Multiplies all lengths by `scale`, the newest keyframe's centre fixed.
 void rescale(double scale, ReferenceKeyframe* reference);
 
-/// How a camera turned while its image was read out, as the image itself tells.
-struct ReadoutTurn {
-  Vec3 rate = Vec3::Zero();         ///< As the rotation in MonoFrame::rate [rad/s].
-  Mat3 information = Mat3::Zero();  ///< [s^2 / rad^2]
-};
-
 /// How a frame was tracked.
 struct FrameTracking {
   bool good = false;
@@ -85,7 +79,6 @@ struct FrameTracking {
   double rmse = 0.0;          ///< Residual [grey levels, or px where features are followed].
   double inlier_ratio = 0.0;  ///< Share of what is compared in view that agrees.
   int inliers = 0;
-  std::optional<ReadoutTurn> readout_turn;  ///< Of a rolling shutter, where it could be measured.
 };
 
 /// What a backend keeps of a frame that was tracked until it is mapped.

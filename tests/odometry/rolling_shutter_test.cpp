@@ -102,7 +102,7 @@ INSTANTIATE_TEST_SUITE_P(
         RolledKind{"Scale", OdometryMode::kScale, Backend::kDirect, kReadoutMs, 0.15},
         RolledKind{"Stereo", OdometryMode::kStereo, Backend::kDirect, kReadoutMs, 0.25},
         RolledKind{"FromBelow", OdometryMode::kScale, Backend::kDirect, -kReadoutMs, 0.15},
-        RolledKind{"Features", OdometryMode::kScale, Backend::kFeatures, kReadoutMs, 0.4}),
+        RolledKind{"Features", OdometryMode::kScale, Backend::kFeatures, kReadoutMs, 0.2}),
     [](const testing::TestParamInfo<RolledKind>& kind) { return kind.param.name; });
 
 TEST(RollingShutterMap, BeginsOnceMoreWithTheSecondFrame) {

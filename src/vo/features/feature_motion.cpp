@@ -38,14 +38,14 @@ FeatureTracking FeatureOdometry::align(const FeatureReference& reference, const 
   // From more starts corners fit a regular pattern by chance.
   constexpr std::array kShares = {0.02, 0.04, 0.07, 0.11, 0.16, 0.23, 0.32};
   const SE3 expected = forecast.known ? forecast.known->expected : forecast.last;
-  FeatureTracking best = tracker_.track(reference, *frame.pyramid, expected,
+  FeatureTracking best = tracker_.track(reference, frame, expected,
                                         forecast.known ? config_.levels - 1 : config_.levels);
   const auto sure = [&](const FeatureTracking& t) {
     return t.tracking.good && t.tracking.inlier_ratio >= config_.sure_inlier_ratio;
   };
   if (sure(best)) return best;
   const auto try_next = [&](const SE3& start) {
-    FeatureTracking t = tracker_.track(reference, *frame.pyramid, start, config_.levels);
+    FeatureTracking t = tracker_.track(reference, frame, start, config_.levels);
     if (t.tracking.inliers > best.tracking.inliers) best = std::move(t);
     return sure(best);
   };
@@ -55,7 +55,7 @@ FeatureTracking FeatureOdometry::align(const FeatureReference& reference, const 
     if (try_next(other)) return best;
   }
   if (best.tracking.good && forecast.known) return best;
-  try_next(tracker_.best_of(reference, *frame.pyramid,
+  try_next(tracker_.best_of(reference, frame,
                             unknown_motions(others.front(), reference.mean_rho, kShares)));
   return best;
 }
@@ -100,7 +100,7 @@ TrackedFrame FeatureOdometry::track_against(const MonoFrame& frame,
   out.covariance = tracked.covariance;
   out.T_world_camera = ref.T_world_camera * out.tracking.T_current_reference.inverse();
   out.wants_keyframe = wants_keyframe(ref, tracked);
-  if (out.wants_keyframe) tracker_.find_unseen(ref, *frame.pyramid, &tracked);
+  if (out.wants_keyframe) tracker_.find_unseen(ref, frame, &tracked);
   out.views = std::move(tracked.views);
   motion_.note(ref, out.tracking.T_current_reference, frame.stamp_ns);
   last_pyramid_ = frame.pyramid;

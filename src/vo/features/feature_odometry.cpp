@@ -139,13 +139,15 @@ void FeatureOdometry::add_landmark(const SelectedPixel& pixel, const DepthPropos
   l.host_id = host.id;
   l.u = static_cast<float>(pixel.x);
   l.v = static_cast<float>(pixel.y);
-  l.ray = ray_of(camera_, l.u, l.v);
+  const bool known = depth.sigma > 0.0F && depth.rho > 0.0F;
+  double rho = known ? static_cast<double>(depth.rho) : window_.mean_inverse_depth();
+  l.ray = ray_at_instant(camera_, host.rows, l.u, l.v, &rho);
   AlignmentPatch patch;
   if (!make_patch(host.pyramid->level(0), l.u, l.v, kNoWarp, &patch)) return;
   l.id = next_landmark_++;
-  if (depth.sigma > 0.0F && depth.rho > 0.0F) {
+  if (known) {
     l.has_depth = true;
-    l.rho = depth.rho;
+    l.rho = rho;
     l.static_sigma = depth.sigma;
   }
   window_.landmarks.push_back(std::move(l));
@@ -162,7 +164,7 @@ void FeatureOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
   last_pyramid_ = frame.pyramid;
   next_keyframe_ = 0;
   window_.keyframes.push_back(
-      {next_keyframe_++, frame.stamp_ns, frame.pyramid, T_world_camera.inverse()});
+      {next_keyframe_++, frame.stamp_ns, frame.pyramid, T_world_camera.inverse(), frame.rows});
   // What begins a map need not be corners, nor apart: two views give all kinds of pixels.
   std::vector<StartPoint> best = points;
   const ImageF response = corner_response(frame.pyramid->level(0));
@@ -223,8 +225,10 @@ MapResult FeatureOdometry::map(const TrackedFrame& tracked, const KeyframeStereo
 }
 
 void FeatureOdometry::insert_keyframe(const TrackedFrame& tracked, const SE3& T_world_camera) {
+  const MonoFrame& frame = tracked.frame;
   window_.keyframes.push_back(
-      {next_keyframe_++, tracked.frame.stamp_ns, tracked.frame.pyramid, T_world_camera.inverse()});
+      {next_keyframe_++, frame.stamp_ns, frame.pyramid, T_world_camera.inverse(), frame.rows});
+  window_.keyframes.back().rows.per_row *= std::exp(log_scale() - tracked.reference->log_scale);
   const auto& views = static_cast<const FeatureViewList&>(*tracked.views).views;
   // Both are in the order of the landmarks' ids.
   auto landmark = window_.landmarks.begin();
@@ -353,9 +357,11 @@ void FeatureOdometry::take_snapshot() {
         !reproject(camera_, window_.T_target_host(newest.id, l.host_id), l.ray, l.rho, &p)) {
       continue;
     }
-    s.points.u.push_back(static_cast<float>(p.pixel.x()));
-    s.points.v.push_back(static_cast<float>(p.pixel.y()));
-    s.points.inverse_depth.push_back(static_cast<float>(l.rho * p.depth_ratio));
+    double rho = l.rho * p.depth_ratio;
+    const Vec2 pixel = seen_by_row(camera_, newest.rows, p.pixel, &rho);
+    s.points.u.push_back(static_cast<float>(pixel.x()));
+    s.points.v.push_back(static_cast<float>(pixel.y()));
+    s.points.inverse_depth.push_back(static_cast<float>(rho));
     s.points.sigma.push_back(static_cast<float>(sigma * p.depth_ratio * p.depth_ratio));
     l.in_snapshot = true;
     shared += was_in ? 1 : 0;

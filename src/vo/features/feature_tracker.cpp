@@ -21,7 +21,7 @@ double sigma_of(const PatchMatch& match, double sigma_px) {
 }  // namespace
 
 std::vector<PatchMatch> FeatureTracker::follow(const FeatureReference& reference,
-                                               const ImagePyramid& pyramid,
+                                               const MonoFrame& frame,
                                                const SE3& T_current_reference,
                                                const std::vector<bool>& wanted, int levels) const {
   const PatchAlignmentConfig alignment{.levels = levels,
@@ -36,16 +36,32 @@ std::vector<PatchMatch> FeatureTracker::follow(const FeatureReference& reference
       const ReferenceFeature& f = reference.features[i];
       const SE3 T = T_current_reference * f.T_reference_host;
       Vec2 pixel;
-      if (!reproject(camera_, T, f.ray, f.rho, &pixel) || !camera_.contains(pixel)) continue;
+      if (!reproject(camera_, T, f.ray, f.rho, &pixel)) continue;
+      const Vec2 by_row = row_displacement(frame.rows, T, f, pixel);
+      pixel += by_row;
+      if (!camera_.contains(pixel)) continue;
       const Mat2 A = surroundings(camera_, T, f.ray, f.rho);
       const PatchWarp warp{static_cast<float>(A(0, 0)), static_cast<float>(A(0, 1)),
                            static_cast<float>(A(1, 0)), static_cast<float>(A(1, 1))};
       matches[i] =
-          find_patch({f.host.get(), f.u, f.v}, pyramid, warp, static_cast<float>(pixel.x()),
+          find_patch({f.host.get(), f.u, f.v}, *frame.pyramid, warp, static_cast<float>(pixel.x()),
                      static_cast<float>(pixel.y()), alignment);
+      // Where it would be seen at the image's instant.
+      matches[i].u -= static_cast<float>(by_row.x());
+      matches[i].v -= static_cast<float>(by_row.y());
     }
   });
   return matches;
+}
+
+/// Of a rolling shutter: from where a landmark is at a frame's instant to where it is seen.
+Vec2 FeatureTracker::row_displacement(const RowShift& rows, const SE3& T_current_host,
+                                      const ReferenceFeature& feature, const Vec2& pixel) const {
+  if (rows.none()) return Vec2::Zero();
+  const Vec3 q =
+      T_current_host.rotation() * feature.ray + feature.rho * T_current_host.translation();
+  double rho = feature.rho / q.z();
+  return seen_by_row(camera_, rows, pixel, &rho) - pixel;
 }
 
 FeaturePose FeatureTracker::pose_of(const FeatureReference& reference,
@@ -73,20 +89,19 @@ bool FeatureTracker::is_in_view(const SE3& T_current_reference, const ReferenceF
          camera_.contains(pixel, AlignmentPatch::kReach);
 }
 
-FeatureTracking FeatureTracker::track(const FeatureReference& reference,
-                                      const ImagePyramid& pyramid, const SE3& expected,
-                                      int levels) const {
+FeatureTracking FeatureTracker::track(const FeatureReference& reference, const MonoFrame& frame,
+                                      const SE3& expected, int levels) const {
   const std::size_t n = reference.features.size();
   std::vector<bool> wanted(n);
   for (std::size_t i = 0; i < n; ++i) wanted[i] = reference.features[i].seen;
-  std::vector<PatchMatch> matches = follow(reference, pyramid, expected, wanted, levels);
+  std::vector<PatchMatch> matches = follow(reference, frame, expected, wanted, levels);
   FeaturePose pose = pose_of(reference, matches, expected);
   for (std::size_t i = 0; i < n; ++i) {
     const ReferenceFeature& f = reference.features[i];
     wanted[i] = f.seen && !(f.has_depth ? pose.inlier[i] : matches[i].found);
   }
   const std::vector<PatchMatch> second =
-      follow(reference, pyramid, pose.T_current_reference, wanted, kLevelsNearby);
+      follow(reference, frame, pose.T_current_reference, wanted, kLevelsNearby);
   for (std::size_t i = 0; i < n; ++i) {
     if (wanted[i]) matches[i] = second[i];
   }
@@ -117,7 +132,7 @@ FeatureTracking FeatureTracker::track(const FeatureReference& reference,
   return out;
 }
 
-SE3 FeatureTracker::best_of(const FeatureReference& reference, const ImagePyramid& pyramid,
+SE3 FeatureTracker::best_of(const FeatureReference& reference, const MonoFrame& frame,
                             const std::vector<SE3>& motions) const {
   constexpr std::size_t kFew = 100;
   std::vector<bool> wanted(reference.features.size(), false);
@@ -129,7 +144,7 @@ SE3 FeatureTracker::best_of(const FeatureReference& reference, const ImagePyrami
   int most = -1;
   for (const SE3& motion : motions) {
     const FeaturePose pose =
-        pose_of(reference, follow(reference, pyramid, motion, wanted, config_.levels), motion);
+        pose_of(reference, follow(reference, frame, motion, wanted, config_.levels), motion);
     if (pose.inliers <= most) continue;
     most = pose.inliers;
     best = pose.T_current_reference;
@@ -137,12 +152,12 @@ SE3 FeatureTracker::best_of(const FeatureReference& reference, const ImagePyrami
   return best;
 }
 
-void FeatureTracker::find_unseen(const FeatureReference& reference, const ImagePyramid& pyramid,
+void FeatureTracker::find_unseen(const FeatureReference& reference, const MonoFrame& frame,
                                  FeatureTracking* tracked) const {
   const SE3& T = tracked->tracking.T_current_reference;
   std::vector<bool> wanted;
   for (const ReferenceFeature& f : reference.features) wanted.push_back(!f.seen);
-  const std::vector<PatchMatch> matches = follow(reference, pyramid, T, wanted, kLevelsNearby);
+  const std::vector<PatchMatch> matches = follow(reference, frame, T, wanted, kLevelsNearby);
   std::vector<FeatureView>& views = tracked->views->views;
   for (std::size_t i = 0; i < matches.size(); ++i) {
     const ReferenceFeature& f = reference.features[i];

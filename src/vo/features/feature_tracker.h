@@ -17,7 +17,7 @@ struct ReferenceFeature {
   ImagePyramidPtr host;
   float u = 0.0F, v = 0.0F;  ///< In the host's level 0 [px].
   SE3 T_reference_host;
-  Vec3 ray;                ///< Of that pixel, z = 1.
+  Vec3 ray;                ///< Of that pixel at the host's instant, z = 1.
   double rho = 0.0;        ///< [1/m]; a guess where there is no depth.
   double rho_sigma = 0.0;  ///< [1/m]
   bool has_depth = false;
@@ -32,7 +32,7 @@ struct FeatureReference : ReferenceKeyframe {
 /// Where a landmark was found in a frame.
 struct FeatureView {
   std::uint64_t id = 0;
-  Vec2 pixel;
+  Vec2 pixel;          ///< At the frame's instant.
   double sigma = 1.0;  ///< Of each coordinate [px].
 };
 
@@ -58,22 +58,24 @@ class FeatureTracker {
       : config_(config), camera_(camera), pool_(pool) {}
 
   /// From a motion that is expected. `levels`: of the pyramid, which bound how far off it may be.
-  FeatureTracking track(const FeatureReference& reference, const ImagePyramid& pyramid,
+  FeatureTracking track(const FeatureReference& reference, const MonoFrame& frame,
                         const SE3& expected, int levels) const;
 
   /// The motion that most of a few features agree with.
-  SE3 best_of(const FeatureReference& reference, const ImagePyramid& pyramid,
+  SE3 best_of(const FeatureReference& reference, const MonoFrame& frame,
               const std::vector<SE3>& motions) const;
 
   /// Adds views of what the reference did not see, but should be in view at the pose that was
   /// found.
-  void find_unseen(const FeatureReference& reference, const ImagePyramid& pyramid,
+  void find_unseen(const FeatureReference& reference, const MonoFrame& frame,
                    FeatureTracking* tracked) const;
 
  private:
-  std::vector<PatchMatch> follow(const FeatureReference& reference, const ImagePyramid& pyramid,
+  std::vector<PatchMatch> follow(const FeatureReference& reference, const MonoFrame& frame,
                                  const SE3& T_current_reference, const std::vector<bool>& wanted,
                                  int levels) const;
+  Vec2 row_displacement(const RowShift& rows, const SE3& T_current_host,
+                        const ReferenceFeature& feature, const Vec2& pixel) const;
   FeaturePose pose_of(const FeatureReference& reference, const std::vector<PatchMatch>& matches,
                       const SE3& start) const;
   bool is_in_view(const SE3& T_current_reference, const ReferenceFeature& feature) const;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "sovo/geometry/camera_model.h"
+#include "sovo/geometry/row_shift.h"
 #include "sovo/geometry/se3.h"
 #include "sovo/image/pyramid.h"
 #include "sovo/vo/keyframe_poses.h"
@@ -13,8 +14,8 @@ namespace sovo {
 /// Where a landmark was found in a keyframe that does not host it.
 struct Observation {
   std::uint32_t keyframe_id = 0;
-  Vec2 pixel = Vec2::Zero();
-  double sigma = 1.0;  ///< Standard deviation of each coordinate [px].
+  Vec2 pixel = Vec2::Zero();  ///< At the keyframe's instant.
+  double sigma = 1.0;         ///< Standard deviation of each coordinate [px].
   bool inlier = true;
 };
 
@@ -23,7 +24,7 @@ struct Landmark {
   std::uint64_t id = 0;
   std::uint32_t host_id = 0;
   float u = 0.0F, v = 0.0F;  ///< In the host's level 0 [px].
-  Vec3 ray = Vec3::UnitZ();  ///< Of that pixel, z = 1.
+  Vec3 ray = Vec3::UnitZ();  ///< Of that pixel at the host's instant, z = 1.
   bool has_depth = false;
   double rho = 0.0;           ///< Inverse depth in the host [1/m].
   double static_sigma = 0.0;  ///< Of the match that gave rho first [1/m]; 0: none.
@@ -46,6 +47,7 @@ struct FeatureKeyframe {
   std::int64_t stamp_ns = 0;
   ImagePyramidPtr pyramid;
   SE3 T_camera_world;
+  RowShift rows;  ///< Of a rolling shutter.
 };
 
 /// Sliding window of keyframes with landmarks. Keyframes have consecutive ids; the oldest leave.

@@ -48,6 +48,22 @@ Vec3 ray_of(const CameraModel& camera, double u, double v) {
   return {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0};
 }
 
+Vec2 seen_by_row(const CameraModel& camera, const RowShift& rows, const Vec2& pixel, double* rho) {
+  if (rows.none()) return pixel;
+  const Vec3 q = ray_of(camera, pixel.x(), pixel.y()) + *rho * rows.at(pixel.y());
+  if (q.z() < kLeastDepth) return pixel;
+  *rho /= q.z();
+  return projected(camera, q);
+}
+
+Vec3 ray_at_instant(const CameraModel& camera, const RowShift& rows, double u, double v,
+                    double* rho) {
+  const Vec3 q = ray_of(camera, u, v) - *rho * rows.at(v);
+  if (q.z() < kLeastDepth) return ray_of(camera, u, v);
+  *rho /= q.z();
+  return q / q.z();
+}
+
 Mat2 surroundings(const CameraModel& camera, const SE3& T_target_host, const Vec3& ray,
                   double rho) {
   const Mat3 R = T_target_host.rotation_matrix();

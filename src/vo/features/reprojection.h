@@ -1,6 +1,7 @@
 #pragma once
 
 #include "sovo/geometry/camera_model.h"
+#include "sovo/geometry/row_shift.h"
 #include "sovo/geometry/se3.h"
 
 namespace sovo {
@@ -28,6 +29,15 @@ bool reproject(const CameraModel& camera, const SE3& T_target_host, const Vec3& 
 
 /// The ray of a pixel of a pinhole camera, z = 1.
 Vec3 ray_of(const CameraModel& camera, double u, double v);
+
+/// What a camera with a rolling shutter sees at `pixel`, `rho` near, at its image's instant [1/m]:
+/// where it is seen in the image, and, in `rho`, how near.
+Vec2 seen_by_row(const CameraModel& camera, const RowShift& rows, const Vec2& pixel, double* rho);
+
+/// The ray at the image's instant of what is seen at (u, v), `rho` near, which becomes that of the
+/// instant [1/m].
+Vec3 ray_at_instant(const CameraModel& camera, const RowShift& rows, double u, double v,
+                    double* rho);
 
 /// How the surroundings of `ray` are mapped into the target when they are as deep as it is:
 /// d pixel' / d pixel by rows.

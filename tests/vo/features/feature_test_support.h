@@ -25,7 +25,7 @@ inline FeatureWindow true_window(int keyframes, int landmarks, double noise, std
   window.camera = feature_camera();
   for (int i = 0; i < keyframes; ++i) {
     window.keyframes.push_back(
-        {static_cast<std::uint32_t>(i), 50'000'000LL * i, nullptr, feature_pose(i)});
+        {static_cast<std::uint32_t>(i), 50'000'000LL * i, nullptr, feature_pose(i), {}});
   }
   for (int n = 0; n < landmarks; ++n) {
     Landmark l;

@@ -129,9 +129,8 @@ struct StereoOdometryConfig {
     v("exposure_motion", exposure_motion,
       "cameras that are not triggered together: the motion between the exposures is undone");
     v("readout_ms", readout_ms,
-      "rolling shutters: time from the exposure of the upmost row to that of the lowest [ms]; 0: "
-      "all "
-      "rows at once");
+      "rolling shutters: from the exposure of the upmost row to that of the lowest [ms]; 0: at "
+      "once");
     v("scale_timeout_s", scale_timeout_s, "without an accepted scale: SCALE_UNOBSERVED [s]");
     v("vo", vo, "direct monocular odometry");
     v("features", features, "feature-based monocular odometry");

@@ -39,7 +39,7 @@ void geometric_jacobian(const CameraModel& camera, const PairGeometry& g,
   const float x = at.x;
   const float y = at.y;
   const float rho_target = at.rho * at.iz;
-  const Eigen::Vector3f t = at.rows.applied(g.frozen_t);
+  const Eigen::Vector3f t = g.rows.none() ? g.frozen_t : at.rows.applied(g.frozen_t);
   r->du_rho = at.iz * (t.x() - t.z() * x) * fx;
   r->dv_rho = at.iz * (t.y() - t.z() * y) * fy;
   r->du = {rho_target * fx, 0.0F, -rho_target * x * fx, -x * y * fx, (1.0F + x * x) * fx, -y * fx};
@@ -82,7 +82,6 @@ void project_pattern(const Window& window, int host, int target, const Point& po
   const Eigen::Vector3f turned = plain_product(g.KRKi, ray);
   Eigen::Vector3f centre = turned + g.Kt * out.rho;
   Eigen::Vector3f frozen_t = g.frozen_t;
-  out.rows = {};
   if (!g.rows.none()) {
     out.rows = row_shift(g, point, centre, image.height());
     const Eigen::Matrix3f K = window.camera().matrix().cast<float>();

@@ -13,7 +13,7 @@ using test::drive;
 using test::kPeriodNs;
 using test::Playback;
 
-constexpr int kRolledFrames = 36;
+constexpr int kRolledFrames = 24;
 constexpr double kReadoutMs = 20.0;  // of a period of 50
 
 /// The drive at twice its speed, swaying: at 0.6 rad/s, back and forth in fifteen frames.

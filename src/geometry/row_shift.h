@@ -10,7 +10,6 @@ namespace sovo {
 struct RowShift {
   Vec3 per_row = Vec3::Zero();  ///< [the map's unit of length]
   double middle = 0.0;          ///< Row of the image's instant [px].
-  double seconds = 0.0;         ///< From row to row; 0: all rows are of one instant.
 
   Vec3 at(double v) const { return (v - middle) * per_row; }
   bool none() const { return per_row.isZero(0.0); }

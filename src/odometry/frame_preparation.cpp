@@ -115,8 +115,7 @@ RowShift FramePreparation::row_shift(const Vec6& rate, int halvings) const {
   const int raw_rows = cameras_.rig.left.height / downscale_;
   const double seconds_a_row = readout_s_ / (raw_rows - 1) * left_unroller_->raw_rows();
   RowShift shift;
-  shift.seconds = (1 << halvings) * seconds_a_row;
-  shift.per_row = shift.seconds * rate.head<3>();
+  shift.per_row = (1 << halvings) * seconds_a_row * rate.head<3>();
   shift.middle =
       static_cast<double>(to_halved(static_cast<float>(left_unroller_->middle_row()), halvings));
   return shift;

@@ -18,7 +18,7 @@ Vec6 rate_of(const Vec3& way, const Vec3& turn) {
 }
 
 RowShift shift_of(const Vec6& rate) {
-  return {.per_row = kSeconds * rate.head<3>(), .middle = kMiddle, .seconds = kSeconds};
+  return {.per_row = kSeconds * rate.head<3>(), .middle = kMiddle};
 }
 
 /// Where a point of the camera at the image's instant is seen in a row, the turning undone.

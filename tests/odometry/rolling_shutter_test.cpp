@@ -123,6 +123,27 @@ TEST(RollingShutterMap, BeginsOnceMoreWithTheSecondFrame) {
   EXPECT_EQ(playback.odometry.refined_trajectory().size(), 8U);
 }
 
+TEST(RollingShutterMap, AKnockedFrameWaitsToBecomeAKeyframe) {
+  const test::SyntheticScene scene(3);
+  const StereoCameras cameras = test::test_cameras();
+  constexpr int kKnocked = 8;
+  StereoFrame knocked = test::drive_frame(kKnocked);
+  // Turned by five degrees on a sudden: any frame like that wants to be a keyframe.
+  const SE3 pose = test::drive(kKnocked) * SE3(SO3::exp(Vec3(0.0, 0.09, 0.0)), Vec3::Zero());
+  knocked.left = test::side_of(scene.render(cameras.rig.left, pose));
+  knocked.right =
+      test::side_of(scene.render(cameras.rig.right, pose * cameras.rig.T_right_left.inverse()));
+  for (const double readout_ms : {0.0, 1.0, 10.0}) {
+    StereoOdometryConfig config = test::test_config();
+    config.readout_ms = readout_ms;
+    Playback playback(config);
+    playback.give_drive(0, kKnocked);
+    const OdometryOutput out = playback.give(knocked);
+    EXPECT_TRUE(out.pose_valid) << readout_ms;
+    EXPECT_EQ(out.is_keyframe, readout_ms < 5.0) << readout_ms;
+  }
+}
+
 TEST(RollingShutterMap, EqualRunsAreEqual) {
   StereoOdometryConfig config = test::test_config();
   config.readout_ms = kReadoutMs;

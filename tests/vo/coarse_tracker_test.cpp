@@ -384,5 +384,37 @@ TEST(TrackingReference, HoldsDepthsAtEveryLevelAndScales) {
   EXPECT_DOUBLE_EQ(twice.log_scale, std::log(2.0));
 }
 
+TEST(TrackingReferenceOfARollingShutter, ShowsEachPointWhereItsRowsDo) {
+  const SyntheticScene scene(5);
+  TrackingReference reference = scene_reference(scene);
+  const double middle = 0.5 * (small_camera().height - 1);
+  reference.rows = {.per_row = Vec3(2e-4, 1e-4, -5e-4), .middle = middle};
+  const RowShift rows{.per_row = Vec3(-1e-4, 2e-4, -6e-4), .middle = middle};
+  const SE3 T(SO3::exp(Vec3(0.01, -0.02, 0.015)), Vec3(0.05, -0.02, -0.2));
+  const TrackingReference moved = moved_by_rows(reference, rows, T);
+  for (std::size_t l = 0; l < 2; ++l) {
+    const ReferenceLevel& level = reference.levels[l];
+    const CameraModel& camera = level.camera;
+    ASSERT_EQ(moved.levels[l].size(), level.size());
+    double most = 0.0;
+    for (std::size_t i = 0; i < level.size(); ++i) {
+      const auto row = [&](double v) { return (v + 0.5) * (1 << l) - 0.5; };
+      const auto point = [&](const ReferenceLevel& of) -> Vec3 {
+        return Vec3((of.u[i] - camera.cx) / camera.fx, (of.v[i] - camera.cy) / camera.fy, 1.0) /
+               static_cast<double>(of.rho[i]);
+      };
+      // At the reference's instant, at the image's, and in the row that shows it.
+      const Vec3 in_image = T * (point(level) - reference.rows.at(row(level.v[i])));
+      Vec2 seen = *camera.project(in_image);
+      for (int k = 0; k < 3; ++k) seen = *camera.project(in_image + rows.at(row(seen.y())));
+      const Vec2 found = *camera.project(T * point(moved.levels[l]));
+      // It is seen a few rows from where the row was taken.
+      EXPECT_LT((found - seen).norm(), 0.05) << "level " << l << " point " << i;
+      most = std::max(most, (seen - *camera.project(T * point(level))).norm());
+    }
+    EXPECT_GT(most, 2.0) << "or the rows do nothing";
+  }
+}
+
 }  // namespace
 }  // namespace sovo

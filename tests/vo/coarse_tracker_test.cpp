@@ -408,11 +408,13 @@ TEST(TrackingReferenceOfARollingShutter, ShowsEachPointWhereItsRowsDo) {
       Vec2 seen = *camera.project(in_image);
       for (int k = 0; k < 3; ++k) seen = *camera.project(in_image + rows.at(row(seen.y())));
       const Vec2 found = *camera.project(T * point(moved.levels[l]));
-      // It is seen a few rows from where the row was taken.
-      EXPECT_LT((found - seen).norm(), 0.05) << "level " << l << " point " << i;
-      most = std::max(most, (seen - *camera.project(T * point(level))).norm());
+      const double displacement = (seen - *camera.project(T * point(level))).norm();
+      // By one instant it is seen some rows from where it is seen: by so much the less, or more, it
+      // moves until then.
+      EXPECT_LT((found - seen).norm(), 0.01 + 0.03 * displacement) << "level " << l << " " << i;
+      most = std::max(most, displacement);
     }
-    EXPECT_GT(most, 2.0) << "or the rows do nothing";
+    EXPECT_GT(most, 1.0) << "or the rows do nothing";
   }
 }
 

@@ -35,6 +35,13 @@ struct StereoRig {
     out.T_right_left = T_right_left * T_later_left;
     return out;
   }
+
+  /// The rig with its right camera turned about its own centre, by `turn` in its own frame.
+  StereoRig turned(const SO3& turn) const {
+    StereoRig out = *this;
+    out.T_right_left = SE3(turn, Vec3::Zero()) * T_right_left;
+    return out;
+  }
 };
 
 }  // namespace sovo

@@ -268,6 +268,30 @@ TEST(SimSourceTest, DarkCameraAndDroppedPairs) {
   EXPECT_TRUE(gap);
 }
 
+TEST(SimSourceTest, TheRightCameraIsTurnedAgainstItsCalibration) {
+  SimConfig config = quiet(World::kPool);
+  config.sensor.right_pitch_deg = 0.4;
+  config.sensor.right_yaw_deg = -0.7;
+  config.sensor.right_roll_deg = 1.5;
+  const StereoRig rig = small_rig(Distortion::kRadtan);
+  SimSource source = make_source(config, rig);
+  EXPECT_TRUE(source.calibration().rig.T_right_left.matrix() == rig.T_right_left.matrix());
+  const StereoFrame turned = first_frame(source);
+  const SO3 turn = SO3::exp(M_PI / 180.0 * Vec3(0.4, -0.7, 1.5));
+  SimSource expected = make_source(quiet(World::kPool), rig.turned(turn));
+  const StereoFrame frame = first_frame(expected);
+  EXPECT_EQ(*turned.left.data, *frame.left.data);
+  EXPECT_EQ(*turned.right.data, *frame.right.data);
+
+  config.sensor.right_turned_from_s = 0.01;  // from the second pair on
+  SimSource later = make_source(config, rig);
+  SimSource never = make_source(quiet(World::kPool), rig);
+  EXPECT_EQ(*first_frame(later).right.data, *first_frame(never).right.data);
+  EXPECT_NE(*first_frame(later).right.data, *first_frame(never).right.data);
+  config.sensor.right_yaw_deg = 21.0;
+  EXPECT_NE(open_sim(config).error().find("right_yaw_deg"), std::string::npos);
+}
+
 TEST(SimSourceTest, PairsAreLostForAWhileAgainAndAgain) {
   SimConfig config = quiet(World::kLawn);
   config.frames = 14;

@@ -78,6 +78,10 @@ struct SensorConfig {
   double shot_noise = 0.8;
   bool motion_blur = true;
   double right_offset_ms = 0.0;
+  double right_pitch_deg = 0.0;
+  double right_yaw_deg = 0.0;
+  double right_roll_deg = 0.0;
+  double right_turned_from_s = 0.0;
   double readout_ms = 0.0;
   double veil = 0.0;
   double light_factor = 1.0;
@@ -107,6 +111,11 @@ struct SensorConfig {
     v("shot_noise", shot_noise, "standard deviation added by light, at full scale [grey levels]");
     v("motion_blur", motion_blur, "blur by motion during the exposure");
     v("right_offset_ms", right_offset_ms, "the right camera exposes later by this [ms]");
+    v("right_pitch_deg", right_pitch_deg,
+      "the right camera is turned against its calibration, about its x axis [deg]");
+    v("right_yaw_deg", right_yaw_deg, "likewise about its y axis [deg]");
+    v("right_roll_deg", right_roll_deg, "likewise about its z axis [deg]");
+    v("right_turned_from_s", right_turned_from_s, "time from which on it is turned [s]");
     v("readout_ms", readout_ms,
       "rolling shutter: the last row is exposed later than the first by this [ms]; 0: all at once");
     v("veil", veil, "share of the light that fog or turbid water spreads evenly");

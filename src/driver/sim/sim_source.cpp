@@ -108,6 +108,11 @@ Result<void> check(const SimConfig& config) {
   if (!(s.readout_ms >= 0.0 && s.readout_ms <= 1000.0)) {
     return Error{"sensor.readout_ms must be in [0, 1000]"};
   }
+  for (const double degrees : {s.right_pitch_deg, s.right_yaw_deg, s.right_roll_deg}) {
+    if (!(std::abs(degrees) <= 20.0)) {
+      return Error{"sensor.right_pitch_deg, right_yaw_deg and right_roll_deg must be in [-20, 20]"};
+    }
+  }
   if (!(s.max_exposure_ms > 0.0)) return Error{"sensor.max_exposure_ms must be positive"};
   if (s.read_noise < 0.0 || s.shot_noise < 0.0) return Error{"noise must not be negative"};
   return {};
@@ -172,8 +177,12 @@ Trajectory SimSource::truth() const {
 
 /// Where a camera is at a time of the trajectory [s].
 SE3 SimSource::camera_at(Side which, double t) const {
-  const SE3 T_left_camera = which == Side::kLeft ? SE3() : calibration_.rig.T_right_left.inverse();
-  return motion_.at(t) * T_left_camera;
+  if (which == Side::kLeft) return motion_.at(t);
+  const SensorConfig& s = config_.sensor;
+  const Vec3 degrees(s.right_pitch_deg, s.right_yaw_deg, s.right_roll_deg);
+  const bool turned = t >= s.right_turned_from_s;
+  const SO3 turn = turned ? SO3::exp(M_PI / 180.0 * degrees) : SO3();
+  return motion_.at(t) * calibration_.rig.turned(turn).T_right_left.inverse();
 }
 
 /// What a camera sees at a time of the trajectory [s], which is that of its middle row.

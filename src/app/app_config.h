@@ -103,6 +103,7 @@ struct OutputSection {
   std::string keyframes;
   std::string profile;
   std::string truth;
+  std::string calibration;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -112,6 +113,7 @@ struct OutputSection {
     v("keyframes", keyframes, "CSV file of every scale optimization");
     v("profile", profile, "JSON file of the times by stage");
     v("truth", truth, "TUM file of the true poses of simulated cameras");
+    v("calibration", calibration, "calibration with the right camera as it was found to be turned");
   }
 };
 

@@ -233,6 +233,13 @@ Result<void> check_config(const AppConfig& config) {
   if (config.odometry.max_halvings < 0 || config.odometry.max_halvings > 4) {
     return Error{"max_halvings must be 0 to 4"};
   }
+  const RightTurnConfig& turn = config.odometry.right_turn;
+  if (!(turn.min_px >= 0.0 && turn.gate_sigmas > 0.0 && turn.expected_px > 0.0 &&
+        turn.memory >= 1)) {
+    return Error{
+        "right_turn: min_px must not be negative, gate_sigmas and expected_px must be positive, "
+        "memory at least 1"};
+  }
   if (!(std::abs(config.odometry.readout_ms) <= 1000.0)) {
     return Error{"readout_ms must be in [-1000, 1000]; negative: rows are read from below"};
   }
@@ -295,6 +302,8 @@ void add_odometry_options(ConfigOptions& options) {
       .flag("--loops", "loops.enabled", "Close loops: correct the trajectory in frame map")
       .value("--out-map", "output.map_trajectory", "With --loops: write it corrected (TUM)", "FILE")
       .value("--out-live", "output.live_trajectory", "Write the poses as published (TUM)", "FILE")
+      .value("--out-calib", "output.calibration",
+             "Write the calibration, with the right camera as it was found to be turned", "FILE")
       .value("--keyframes", "output.keyframes", "Write every scale optimization", "FILE.csv")
       .value("--profile", "output.profile", "Write the times by stage", "FILE.json");
 }

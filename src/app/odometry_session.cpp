@@ -25,6 +25,15 @@ std::unique_ptr<LoopSink> make_loops(const AppConfig& config, LoopSink::OnPlace 
   return std::make_unique<LoopSink>(config.loops, odometry.matcher, live, std::move(on_place));
 }
 
+void tell_turn(const SO3& turn) {
+  const Vec3 degrees = 180.0 / M_PI * turn.log();
+  spdlog::warn(
+      "the right camera is turned against its calibration by {:.3f}, {:.3f} and {:.3f} deg (pitch, "
+      "yaw, roll), which was undone: calibrate again, or write a calibration that fits with "
+      "--out-calib FILE",
+      degrees.x(), degrees.y(), degrees.z());
+}
+
 }  // namespace
 
 OdometrySession::OdometrySession(const AppConfig& config, const StereoCameras& cameras,
@@ -65,6 +74,9 @@ int OdometrySession::finish(const StampMap& original_stamp) {
   }
   results.recorder = &recorder_;
   results.profile = &profile_;
+  const SO3 turn = odometry_->right_turn();
+  results.rig = cameras_.rig.turned(turn);
+  if (!turn.log().isZero(0.0)) tell_turn(turn);
   results.context.threads = config_.odometry.threads;
   results.original_stamp = original_stamp;
   const RunCounts counts = recorder_.counts();

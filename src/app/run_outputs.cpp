@@ -7,6 +7,7 @@
 #include <string>
 #include <system_error>
 
+#include "sovo/io/calibration.h"
 #include "sovo/io/text.h"
 #include "sovo/io/trajectory_file.h"
 
@@ -66,7 +67,7 @@ Result<void> check_writable(const std::string& file) {
 Result<void> check_outputs(const OutputSection& output) {
   for (const std::string* file :
        {&output.trajectory, &output.map_trajectory, &output.live_trajectory, &output.keyframes,
-        &output.profile, &output.truth}) {
+        &output.profile, &output.truth, &output.calibration}) {
     if (file->empty()) continue;
     if (auto writable = check_writable(*file); !writable) return writable;
   }
@@ -97,6 +98,10 @@ Result<void> write_outputs(const OutputSection& output, const RunResults& result
     auto done = write_text_file(
         output.profile,
         profile_json(*results.profile, results.recorder->counts(), results.context));
+    if (!done) return done;
+  }
+  if (!output.calibration.empty()) {
+    auto done = write_text_file(output.calibration, format_sovo_calibration(results.rig));
     if (!done) return done;
   }
   return {};

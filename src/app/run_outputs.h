@@ -20,6 +20,7 @@ struct RunResults {
   const RunRecorder* recorder = nullptr;
   const ProfileCollector* profile = nullptr;
   ProfileContext context;
+  StereoRig rig;  ///< As it was given, with the right camera as it was found to be turned.
   StampMap original_stamp;  ///< Empty: stamps are the dataset's already.
 };
 

@@ -1,5 +1,9 @@
 #include "sovo/bridge/diagnostics.h"
 
+#include <cmath>
+#include <iomanip>
+#include <sstream>
+
 #include "sovo/bridge/borrow.h"
 #include "sovo/bridge/ros_conversion.h"
 
@@ -7,6 +11,15 @@ namespace sovo::bridge {
 namespace {
 
 using Level = MessageTraits<msg::DiagnosticStatus>;
+
+/// Pitch, yaw and roll.
+std::string in_degrees(const Vec3& turn) {
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(3);
+  const Vec3 degrees = 180.0 / M_PI * turn;
+  out << degrees.x() << " " << degrees.y() << " " << degrees.z();
+  return out.str();
+}
 
 }  // namespace
 
@@ -20,6 +33,7 @@ DiagnosticReport describe(const std::string& process_name, const OdometryOutput&
   DiagnosticReport report;
   report.name = process_name;
   report.level = stale ? std::uint8_t{Level::STALE} : diagnostic_level(output.state);
+  if (output.decalibrated && report.level == Level::OK) report.level = Level::WARN;
   report.text = stale ? "no frames come; last state " : "";
   report.text += to_string(output.state);
   if (!output.reason.empty()) report.text += ": " + output.reason;
@@ -30,6 +44,7 @@ DiagnosticReport describe(const std::string& process_name, const OdometryOutput&
       {"rejected", std::to_string(output.rejected + feed.rejected)},
       {"segment", std::to_string(output.segment)},
       {"halvings", std::to_string(output.halvings)},
+      {"right_turn_deg", in_degrees(output.right_turn)},
       {"points", std::to_string(output.points)},
       {"inliers", std::to_string(output.inliers)},
       {"keyframes", std::to_string(output.keyframes)},

@@ -69,7 +69,7 @@ DepthProposal proposal_of(const StaticMatch& match) {
 
 MapSegment::MapSegment(const StereoOdometryConfig& config, const FramePreparation& preparation,
                        std::uint32_t index, const SE3& T_odom_left_start, int halvings,
-                       WorkerPool* pool, StageObserver* observer)
+                       const RightTurn& right_turn, WorkerPool* pool, StageObserver* observer)
     : config_(config),
       preparation_(preparation),
       index_(index),
@@ -78,12 +78,13 @@ MapSegment::MapSegment(const StereoOdometryConfig& config, const FramePreparatio
       pool_(pool),
       observer_(observer),
       vo_(new_backend(config, rig().left, preparation.left_mask(halvings), halvings, pool)),
-      matcher_(config.matcher, rig()),
+      right_(config.matcher, rig(), right_turn),
       readout_motion_(preparation),
       optimizer_(config.scale, rig()),
       filter_(config.filter),
-      assist_(config.assist),
-      scale_path_until_(T_odom_left_start.translation()) {}
+      assist_(config.assist) {
+  scale_path_.restart(T_odom_left_start.translation());
+}
 
 bool MapSegment::initialize(const MonoFrame& frame, const SideImage* right) {
   const bool only_stereo = config_.init == InitMethod::kStereo;
@@ -111,7 +112,7 @@ bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage&
   const auto right_pyramid = std::make_shared<const ImagePyramid>(
       preparation_.prepare_right(right, halvings_, frame.rate));
   const std::vector<StaticMatch> matches =
-      match_all(matcher_, *frame.pyramid, *right_pyramid, pixels);
+      match_all(right_.matcher(), *frame.pyramid, *right_pyramid, pixels);
   std::vector<StartPoint> points(pixels.size());
   std::size_t good = 0;
   std::size_t in_view = 0;
@@ -135,7 +136,7 @@ bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage&
     reason_ = stereo_problem_;
     return false;
   }
-  if (stereo()) vo_->use_static_residuals(rig());
+  if (stereo()) vo_->use_static_residuals(right_.rig());
   const bool at_once = right.stamp_offset_ns == 0;
   vo_->begin(frame, T_odom_left_start_, points, stereo() && at_once ? right_pyramid : nullptr);
   readout_motion_.begin(*vo_->reference());
@@ -223,7 +224,7 @@ std::vector<StaticMatch> MapSegment::match_all(const StaticMatcher& matcher,
 
 DepthProposer MapSegment::stereo_proposer(const ImagePyramidPtr& left, const ImagePyramid& right,
                                           const SE3& T_later_left) const {
-  return [this, left, &right, matcher = matcher_.moved(T_later_left)](
+  return [this, left, &right, matcher = right_.matcher().moved(T_later_left)](
              const std::vector<SelectedPixel>& pixels, std::vector<DepthProposal>* proposals) {
     const std::vector<StaticMatch> matches = match_all(matcher, *left, right, pixels);
     std::transform(matches.begin(), matches.end(), proposals->begin(), proposal_of);
@@ -276,6 +277,7 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
                         tracked.frame.stamp_ns);
   if (use_right) {
     job.T_later_left = exposure_motion_.until(right->stamp_offset_ns);
+    job.turn = right_.turn();
     const auto start = std::chrono::steady_clock::now();
     job.right = std::make_shared<const ImagePyramid>(
         preparation_.prepare_right(*right, halvings_, tracked.frame.rate));
@@ -287,7 +289,7 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
     }
     keyframe_stereo.T_later_left = job.T_later_left;
     if (static_residuals() && metric) {
-      vo_->use_static_residuals(rig());
+      vo_->use_static_residuals(right_.rig());
       keyframe_stereo.right = job.right;
     }
   }
@@ -314,7 +316,7 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
 ScaleEstimate MapSegment::estimate_scale(const ScaleJob& job) const {
   const auto start = std::chrono::steady_clock::now();
   const ScaleEstimate estimate =
-      optimizer_.estimate(job.snapshot, *job.right, job.cold_start, job.T_later_left);
+      optimizer_.estimate(job.snapshot, *job.right, job.cold_start, job.T_later_left, job.turn);
   if (observer_ != nullptr) {
     observer_->on_stage(Stage::kScaleOptimization, job.pyramid_seconds + seconds_since(start));
   }
@@ -326,6 +328,7 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
   const double pending = vo_->log_scale() - job.snapshot.log_scale;
   ScaleMeasurement m;
   m.estimate = estimate;
+  filter_.widen(right_.note(job.turn, &m.estimate));
   m.cold_start = job.cold_start;
   m.stamp_ns = job.snapshot.stamp_ns;
   m.shared_points = job.snapshot.shared_points;
@@ -357,26 +360,18 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
     if (correction.first_lock) refined_until_ = 0;  // it rescales what was built before
   }
   if (was_locked) {
-    extend_scale_path(position, sigma_before);
+    // Of the scale that the camera came here with: a correction leaves the newest keyframe in its
+    // place.
+    scale_path_.extend(position, sigma_before);
   } else if (filter_.locked()) {
     // All that was built before took this scale at once, about the newest keyframe.
-    scale_path_covariance_.setZero();
-    scale_path_until_ =
-        position - std::exp(record.correction) * (position - T_odom_left_start_.translation());
-    extend_scale_path(position, filter_.path_sigma());
+    const Vec3 since = position - T_odom_left_start_.translation();
+    scale_path_.restart(position - std::exp(record.correction) * since);
+    scale_path_.extend(position, filter_.path_sigma());
   }
   const bool watched = stereo() && update.verdict == ScaleVerdict::kAccepted;
   publish_scale(&record, update.apply || watched);
   return record;
-}
-
-/// `sigma`: the filter's `path_sigma`, made for steps that are summed as if their errors were
-/// independent, of the scale that the camera came here with: its correction leaves the newest
-/// keyframe in its place.
-void MapSegment::extend_scale_path(const Vec3& position, double sigma) {
-  const Vec3 step = position - scale_path_until_;
-  scale_path_until_ = position;
-  scale_path_covariance_ += sigma * sigma * step * step.transpose();
 }
 
 void MapSegment::publish_scale(const ScaleRecord* record, bool accepted) {
@@ -384,8 +379,9 @@ void MapSegment::publish_scale(const ScaleRecord* record, bool accepted) {
   status_.locked = metric();
   status_.log_scale = vo_->log_scale();
   status_.sigma = filter_.sigma();
-  status_.path_covariance = scale_path_covariance_;
-  status_.path_until = scale_path_until_;
+  status_.path = scale_path_;
+  status_.decalibrated = right_.known().decalibrated();
+  status_.right_turn = right_.turn();
   if (record != nullptr) {
     status_.last_correction = record->correction;
     status_.residual = record->residual;
@@ -427,7 +423,7 @@ KeyframeOutput MapSegment::new_keyframe(const ScaleJob& job) const {
       scale_status().position_covariance(out.T_odom_left.translation());
   out.left = s.pyramid;
   out.right = job.right;
-  out.T_later_left = job.T_later_left;
+  out.T_later_left = job.T_later_left_turned(rig().T_right_left);
   out.halvings = halvings_;
   return out;
 }

@@ -5,11 +5,12 @@
 #include <optional>
 #include <string>
 
-#include "sovo/image/static_matcher.h"
 #include "sovo/odometry/exposure_motion.h"
 #include "sovo/odometry/frame_preparation.h"
 #include "sovo/odometry/odometry_output.h"
 #include "sovo/odometry/readout_motion.h"
+#include "sovo/odometry/right_camera.h"
+#include "sovo/odometry/scale_path.h"
 #include "sovo/odometry/stereo_odometry.h"
 #include "sovo/vo/monocular_backend.h"
 #include "sovo/vo/two_view_initializer.h"
@@ -26,16 +27,12 @@ struct ScaleStatus {
   double residual = 0.0;
   std::int64_t accepted_stamp_ns = 0;
   ScaleVerdict verdict = ScaleVerdict::kTooFewPoints;
-  /// What errors of scale add to the covariance of a position since the segment began [m^2], up to
-  /// the place of the newest keyframe whose scale was sought.
-  Mat3 path_covariance = Mat3::Zero();
-  Vec3 path_until = Vec3::Zero();
+  bool decalibrated = false;  ///< The right camera is turned against its calibration.
+  SO3 right_turn;             ///< By this, which is undone.
+  ScalePath path;             ///< Up to the place of the newest keyframe whose scale was sought.
 
-  /// What they add to that of a camera at `position` [m^2].
-  Mat3 position_covariance(const Vec3& position) const {
-    const Vec3 since = position - path_until;
-    return path_covariance + sigma * sigma * since * since.transpose();
-  }
+  /// What errors of scale add to the covariance of a camera's `position` [m^2].
+  Mat3 position_covariance(const Vec3& position) const { return path.at(position, sigma); }
 };
 
 /// A keyframe's snapshot with the right image that was taken with it.
@@ -43,8 +40,15 @@ struct ScaleJob {
   KeyframeSnapshot snapshot;
   ImagePyramidPtr right;
   SE3 T_later_left;              ///< The left camera into where it was when `right` was exposed.
+  SO3 turn;                      ///< Of the right camera, as it is undone here.
   double pyramid_seconds = 0.0;  ///< What the right pyramid cost.
   bool cold_start = false;
+
+  /// `T_later_left` with the turn in it, where lengths are metres: as if the left camera had
+  /// turned.
+  SE3 T_later_left_turned(const SE3& T_right_left) const {
+    return T_right_left.inverse() * SE3(turn, Vec3::Zero()) * T_right_left * T_later_left;
+  }
 };
 
 /// What mapping a frame brought.
@@ -64,9 +68,10 @@ struct MappingOutcome {
 /// thread; `estimate_scale` may run anywhere.
 class MapSegment {
  public:
+  /// `right_turn`: what is known of it so far.
   MapSegment(const StereoOdometryConfig& config, const FramePreparation& preparation,
-             std::uint32_t index, const SE3& T_odom_left_start, int halvings, WorkerPool* pool,
-             StageObserver* observer);
+             std::uint32_t index, const SE3& T_odom_left_start, int halvings,
+             const RightTurn& right_turn, WorkerPool* pool, StageObserver* observer);
 
   std::uint32_t index() const { return index_; }
   int halvings() const { return halvings_; }
@@ -107,6 +112,7 @@ class MapSegment {
   std::vector<KeyframeOutput> remaining_keyframes() const;
 
   ScaleStatus scale_status() const;
+  RightTurn right_turn() const { return right_.known(); }
   const MonocularBackend& vo() const { return *vo_; }
   /// What the beginning has mapped by itself: the first keyframe, of two views also the second.
   /// It waits here once.
@@ -136,7 +142,6 @@ class MapSegment {
   void revise(const SE3& T_odom_left, KeyframeOutput* keyframe) const;
   void revise_left(const std::vector<KeyframeState>& left, std::vector<KeyframeOutput>* out);
   void publish_scale(const ScaleRecord* record, bool accepted);
-  void extend_scale_path(const Vec3& position, double sigma);
 
   const StereoOdometryConfig& config_;
   const FramePreparation& preparation_;
@@ -147,7 +152,7 @@ class MapSegment {
   StageObserver* observer_;
 
   std::unique_ptr<MonocularBackend> vo_;
-  StaticMatcher matcher_;
+  RightCamera right_;
   ExposureMotion exposure_motion_;  ///< Of the mapping thread.
   ReadoutMotion readout_motion_;    ///< Of the tracking thread.
   ScaleOptimizer optimizer_;
@@ -170,8 +175,7 @@ class MapSegment {
   std::size_t refined_until_ = 0;        ///< Those before this one do not change any more.
 
   std::optional<Vec3> last_keyframe_position_;
-  Mat3 scale_path_covariance_ = Mat3::Zero();
-  Vec3 scale_path_until_ = Vec3::Zero();
+  ScalePath scale_path_;
   mutable std::mutex status_mutex_;
   ScaleStatus status_;
 };

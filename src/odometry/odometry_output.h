@@ -77,10 +77,12 @@ struct OdometryOutput {
   std::uint64_t dropped_queue = 0;  ///< Frames dropped because mapping or tracking was late.
   std::uint64_t rejected = 0;       ///< Frames refused (bad stamp, size, content).
   std::uint32_t reset_counter = 0;
-  int halvings = 0;             ///< How often images are halved to be tracked.
-  std::uint32_t points = 0;     ///< Active in the window.
-  std::uint32_t inliers = 0;    ///< Pixels of the tracking reference that agree.
-  std::uint32_t keyframes = 0;  ///< In the window.
+  int halvings = 0;                ///< How often images are halved to be tracked.
+  bool decalibrated = false;       ///< The right camera is turned against its calibration.
+  Vec3 right_turn = Vec3::Zero();  ///< And by this, about its own axes, which is undone [rad].
+  std::uint32_t points = 0;        ///< Active in the window.
+  std::uint32_t inliers = 0;       ///< Pixels of the tracking reference that agree.
+  std::uint32_t keyframes = 0;     ///< In the window.
   std::uint32_t queue_depth = 0;
   double sync_error_s = 0.0;
   double residual = 0.0;  ///< RMS of tracking [grey levels; px where features are followed].
@@ -115,8 +117,10 @@ struct KeyframeOutput {
   Mat6 covariance = Mat6::Zero();  ///< Of T_odom_left, as in OdometryOutput.
   ImagePyramidPtr left;            ///< Its undistorted image.
   ImagePyramidPtr right;           ///< The raw one that was taken with it; null: there was none.
-  SE3 T_later_left;                ///< `left`'s camera into where it was when `right` was exposed.
-  int halvings = 0;                ///< How often both were halved, unlike `u` and `v`.
+  /// `left`'s camera into where it was when `right` was exposed, by the rig as it was calibrated: a
+  /// turn of the right camera that is undone is in it.
+  SE3 T_later_left;
+  int halvings = 0;  ///< How often both were halved, unlike `u` and `v`.
 };
 
 /// One run of the scale optimizer, a line of `--keyframes`.

@@ -95,6 +95,7 @@ class StereoOdometry::Impl {
     return recorder_.trajectory(&segment_->vo().keyframes());
   }
 
+  SO3 right_turn() const { return segment_->right_turn().turn(); }
   const StereoRig& tracked_rig() const { return preparation_.rig(); }
   const ImageU8& tracked_mask() const { return preparation_.left_mask(); }
 
@@ -124,8 +125,10 @@ class StereoOdometry::Impl {
 
   std::unique_ptr<MapSegment> new_segment(std::uint32_t index, const SE3& T_odom_left,
                                           int halvings) {
-    return std::make_unique<MapSegment>(config_, preparation_, index, T_odom_left, halvings, &pool_,
-                                        observer_);
+    const RightTurn known = segment_ ? segment_->right_turn()
+                                     : RightTurn(config_.right_turn, preparation_.rig().right.fx);
+    return std::make_unique<MapSegment>(config_, preparation_, index, T_odom_left, halvings, known,
+                                        &pool_, observer_);
   }
 
   void set_segment(std::unique_ptr<MapSegment> segment) {
@@ -338,6 +341,8 @@ class StereoOdometry::Impl {
     out->last_correction = scale.last_correction;
     out->scale_residual = scale.residual;
     out->scale_verdict = scale.verdict;
+    out->decalibrated = scale.decalibrated;
+    out->right_turn = scale.right_turn.log();
     if (scale.accepted_stamp_ns != 0) {
       out->scale_age_s = kNanosecond * static_cast<double>(out->stamp_ns - scale.accepted_stamp_ns);
     }
@@ -388,6 +393,9 @@ class StereoOdometry::Impl {
     }
     if (out.state == OdometryState::kScaleUnobserved) {
       return "scale not measured: " + to_string(out.scale_verdict);
+    }
+    if (out.decalibrated) {
+      return "the right camera is turned against its calibration, which is undone: calibrate again";
     }
     return "";
   }
@@ -441,5 +449,6 @@ std::vector<TrajectoryPose> StereoOdometry::refined_trajectory() const {
 }
 const StereoRig& StereoOdometry::tracked_rig() const { return impl_->tracked_rig(); }
 const ImageU8& StereoOdometry::tracked_mask() const { return impl_->tracked_mask(); }
+SO3 StereoOdometry::right_turn() const { return impl_->right_turn(); }
 
 }  // namespace sovo

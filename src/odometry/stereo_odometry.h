@@ -11,6 +11,7 @@
 #include "sovo/image/undistorter.h"
 #include "sovo/odometry/odometry_output.h"
 #include "sovo/odometry/stereo_assist.h"
+#include "sovo/scale/right_turn.h"
 #include "sovo/scale/scale_filter.h"
 #include "sovo/scale/scale_optimizer.h"
 #include "sovo/vo/direct_config.h"
@@ -101,6 +102,7 @@ struct StereoOdometryConfig {
   FeatureConfig features;
   ScaleOptimizerConfig scale;
   ScaleFilterConfig filter;
+  RightTurnConfig right_turn;
   StaticMatcherConfig matcher;
   UndistortionConfig undistortion;
 
@@ -136,6 +138,7 @@ struct StereoOdometryConfig {
     v("features", features, "feature-based monocular odometry");
     v("scale", scale, "scale optimization");
     v("filter", filter, "scale filter");
+    v("right_turn", right_turn, "a right camera that is turned against its calibration");
     v("matcher", matcher, "static stereo matching");
     v("undistortion", undistortion, "undistortion of the left image");
   }
@@ -185,6 +188,10 @@ class StereoOdometry {
 
   /// 0 where the tracked image must not be used; empty when all may be.
   const ImageU8& tracked_mask() const;
+
+  /// How the right camera was found to be turned against the rig that was given, about its own
+  /// centre (StereoRig::turned); the identity while it is taken as it was calibrated.
+  SO3 right_turn() const;
 
  private:
   class Impl;

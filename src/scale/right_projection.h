@@ -22,6 +22,9 @@ class RightProjection {
   /// CameraModel::project to a few thousandths of a pixel.
   void project(const ScalePoints& points, double sigma, int level, ScaleProjections* out) const;
 
+  /// Focal length along the rows [px].
+  double focal() const { return camera_.fx; }
+
  private:
   CameraModel camera_;
   /// Where the distortion folds back: squared radius of the normalized plane (radtan), or angle

@@ -12,7 +12,9 @@ namespace {
 constexpr int kLanes = ScalePoints::kLanes;
 constexpr double kMinDispersion = 0.01;  ///< Residuals a tenth of what is expected.
 constexpr double kMaxDispersion = 9.0;
-constexpr int kCell = 8;  ///< Of the z-buffer [px].
+constexpr int kCell = 8;                 ///< Of the z-buffer [px].
+constexpr double kLargestSlope2 = 1e14;  ///< Of a grey level by a turn [1/rad^2].
+constexpr double kUnlikelyTurn = 0.02;   ///< Of the right camera [rad]: damps what nothing tells.
 
 /// Adds the lanes up in a fixed order.
 double total(const float (&lanes)[kLanes]) {
@@ -148,6 +150,7 @@ void ScaleAlignment::find_occlusions(double sigma) {
 void ScaleAlignment::linearize(double sigma) {
   const ScalePoints& points = workspace_->points;
   ScaleSamples& out = workspace_->samples;
+  linearized_at_ = sigma;
   projection_.project(points, sigma, level_, &workspace_->projections);
   const ScaleProjections& at = workspace_->projections;
   const ImageF& image = right_[level_];
@@ -207,6 +210,10 @@ ScaleSums ScaleAlignment::sums() const {
           total(sums[4])};
 }
 
+void ScaleAlignment::fit_dispersion(const ScaleSums& s) {
+  dispersion_ = std::clamp(s.W_e2 / s.count, kMinDispersion, kMaxDispersion);
+}
+
 bool ScaleAlignment::minimize(double stop, double* sigma, int* iterations) {
   double last = 0.0;
   for (int i = 0; i < config_.max_iterations; ++i) {
@@ -215,7 +222,7 @@ bool ScaleAlignment::minimize(double stop, double* sigma, int* iterations) {
     if (i == 0 || i == 2) fit_brightness();
     const ScaleSums s = sums();
     ++*iterations;
-    dispersion_ = std::clamp(s.W_e2 / s.count, kMinDispersion, kMaxDispersion);
+    fit_dispersion(s);
     if (!(s.H > 0.0)) return false;
     double step = std::clamp(-s.b / s.H, -config_.max_step, config_.max_step);
     if (step * last < 0.0) step *= 0.7;  // about to swing
@@ -250,26 +257,51 @@ double ScaleAlignment::variance() const {
   return config_.variance_factor * squares / (information * information) + floor;
 }
 
-double ScaleAlignment::displacement_across() const {
+TurnStep ScaleAlignment::turn_step() const {
+  // How pixels move by a turn about each axis, by differences, whatever the lens.
+  constexpr double kTurn = 1e-3;
+  const ScaleProjections& at = workspace_->projections;
+  const std::array<ScaleProjections, 3>& turned = workspace_->turned_projections;
+  for (int axis = 0; axis < 3; ++axis) {
+    workspace_->turned = workspace_->points;
+    workspace_->turned.turn_right(kTurn * Vec3::Unit(axis));
+    projection_.project(workspace_->turned, linearized_at_, level_,
+                        &workspace_->turned_projections[static_cast<std::size_t>(axis)]);
+  }
   const ScalePoints& points = workspace_->points;
   const ScaleSamples& samples = workspace_->samples;
   const Weighting w = weighting(config_, dispersion_, brightness_);
-  Mat2 H = Mat2::Zero();
-  Vec2 b = Vec2::Zero();
+  Eigen::Matrix4d H = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d b = Eigen::Vector4d::Zero();
   for (std::size_t i = 0; i < static_cast<std::size_t>(points.size); ++i) {
+    if (samples.mask[i] == 0.0F) continue;
     const Residual e = residual_of(w, samples.value[i], points.reference[i], samples.gradient[i],
                                    points.relative_variance[i]);
-    const double weight =
-        static_cast<double>(samples.mask[i] * e.inverse_variance * (w.nu + 1.0F) / (w.nu + e.u));
-    const Vec2 J(static_cast<double>(samples.gradient[i]), static_cast<double>(samples.across[i]));
-    H += weight * J * J.transpose();
+    const double weight = static_cast<double>(e.inverse_variance * (w.nu + 1.0F) / (w.nu + e.u));
+    // The image gradient from its parts along the epipolar curve and across it.
+    const float shift = std::sqrt(at.jx[i] * at.jx[i] + at.jy[i] * at.jy[i]);
+    const float along = samples.gradient[i] / shift;
+    const float gx = (along * at.jx[i] - samples.across[i] * at.jy[i]) / shift;
+    const float gy = (along * at.jy[i] + samples.across[i] * at.jx[i]) / shift;
+    Eigen::Vector4d J(static_cast<double>(samples.gradient[i]), 0.0, 0.0, 0.0);
+    for (std::size_t k = 0; k < 3; ++k) {
+      const float moved = gx * (turned[k].x[i] - at.x[i]) + gy * (turned[k].y[i] - at.y[i]);
+      J[static_cast<Eigen::Index>(k) + 1] = static_cast<double>(moved) / kTurn;
+    }
+    if (!(J.squaredNorm() < kLargestSlope2)) continue;  // turned out of what the lens projects
+    H.noalias() += weight * J * J.transpose();
     b += weight * static_cast<double>(e.r) * J;
   }
-  const double determinant = H(0, 0) * H(1, 1) - H(0, 1) * H(0, 1);
-  if (!(determinant > 1e-9 * H(0, 0) * H(1, 1))) return 0.0;
-  // Second row of -H^-1 b. The right image shows the point that far from its projection.
-  const double step = -(H(0, 0) * b[1] - H(0, 1) * b[0]) / determinant;
-  return step * static_cast<double>(1 << level_);
+  TurnStep out;
+  if (!(H(0, 0) > 0.0)) return out;
+  out.scale_by_turn = -H.block<3, 1>(1, 0) / H(0, 0);
+  const Mat3 information = H.bottomRightCorner<3, 3>() +
+                           H.block<3, 1>(1, 0) * out.scale_by_turn.transpose() +
+                           Mat3::Identity() / (kUnlikelyTurn * kUnlikelyTurn);
+  out.covariance = information.inverse();
+  out.turn = -out.covariance * (b.tail<3>() + out.scale_by_turn * b[0]);
+  out.log_scale = -b[0] / H(0, 0) + out.scale_by_turn.dot(out.turn);
+  return out;
 }
 
 double ScaleAlignment::correlation(double sigma, int min_count) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "sovo/image/pyramid.h"
@@ -36,9 +37,20 @@ struct ScaleSums {
   double count = 0.0;
 };
 
+/// A Gauss-Newton step of log-scale and of a turn of the right camera about its own centre, in its
+/// own frame [rad].
+struct TurnStep {
+  double log_scale = 0.0;
+  Vec3 turn = Vec3::Zero();
+  Mat3 covariance = Mat3::Zero();     ///< Of `turn`, log-scale being unknown.
+  Vec3 scale_by_turn = Vec3::Zero();  ///< d log-scale / d turn of the best scale.
+};
+
 /// Everything that an alignment stores; kept between calls to save the allocation.
 struct ScaleWorkspace {
   ScalePoints points;
+  ScalePoints turned;
+  std::array<ScaleProjections, 3> turned_projections;
   ScaleProjections projections;
   ScaleSamples samples;
   std::vector<int> nearest;  ///< z-buffer: index of the nearest point of a cell.
@@ -71,6 +83,9 @@ class ScaleAlignment {
   /// Closed form brightness: equal first and second moments of both sides, robustly reweighted.
   void fit_brightness();
 
+  /// How much larger residuals are than expected, by the sums at the last linearization.
+  void fit_dispersion(const ScaleSums& sums);
+
   /// Sums at the last linearization.
   ScaleSums sums() const;
 
@@ -81,9 +96,8 @@ class ScaleAlignment {
   /// the distribution of the residuals, times kappa, and no less than the floor.
   double variance() const;
 
-  /// One Gauss-Newton step of a displacement of the right image across the epipolar curves,
-  /// solved jointly with log-scale [px of level 0].
-  double displacement_across() const;
+  /// The step from the last linearization.
+  TurnStep turn_step() const;
 
   /// Zero-mean normalized cross-correlation of left and right values at log-scale `sigma`; -1 when
   /// fewer than `min_count` points are in view.
@@ -112,6 +126,7 @@ class ScaleAlignment {
   CameraBrightness brightness_;
   double dispersion_ = 1.0;
   double mean_shift_ = 0.0;
+  double linearized_at_ = 0.0;  ///< Log-scale.
   int level_ = 0;
 };
 

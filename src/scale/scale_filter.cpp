@@ -47,6 +47,11 @@ void ScaleFilter::lock_initial(double sigma, std::int64_t stamp_ns) {
   accepted_stamp_ns_ = stamp_ns;
 }
 
+void ScaleFilter::widen(double log_scale) {
+  variance_ += square(log_scale);
+  path_variance_ += square(log_scale);
+}
+
 ScaleUpdate ScaleFilter::update(const ScaleMeasurement& m) {
   if (locked_) {  // the error has walked since the last keyframe, seen or not
     variance_ += walked(m);

@@ -85,6 +85,10 @@ class ScaleFilter {
   /// Stereo depth has given the window its scale: starts locked, with this standard deviation.
   void lock_initial(double sigma, std::int64_t stamp_ns);
 
+  /// The scale may be off by `log_scale` more than was thought: the standard deviation of what has
+  /// changed, as the calibration.
+  void widen(double log_scale);
+
   /// Forgets everything but the learned noises.
   void reset();
 

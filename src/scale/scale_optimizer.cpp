@@ -14,21 +14,23 @@ namespace sovo {
 namespace {
 
 constexpr double kMinBaseline = 1e-6;  ///< [m]
-constexpr int kAcrossLevel = 2;        ///< Where displacement across the epipolar curve is taken.
+constexpr int kCoarseLevel = 2;        ///< Where a turn of a few pixels is still seen as one.
 constexpr int kSparsePoints = 600;     ///< Of the finer grid of a cold start.
+constexpr int kTurnIterations = 5;     ///< A pyramid level.
+constexpr double kFarTurnPx = 0.7;     ///< Of the right camera, beyond which one step is too long.
+constexpr double kLargestTurn = 0.1;   ///< [rad]
 constexpr double kEdgeOfRange = 0.02;  ///< Of the search, in log-scale.
 
-/// Gauss-Newton from the level of the start to level 0.
+/// Gauss-Newton from the level of the start to level 0. `coarse`: how the right camera is turned,
+/// as a coarse level sees it.
 bool descend(const ScaleOptimizerConfig& config, int coarsest_level, ScaleAlignment* alignment,
-             ScaleEstimate* out) {
+             ScaleEstimate* out, Vec3* coarse) {
   for (int level = coarsest_level; level >= 0; --level) {
     if (level == coarsest_level || level == 0) alignment->find_occlusions(out->log_scale);
     alignment->set_level(level);
     const double stop = level == 0 ? config.stop_step : 1e-3 * (1 << level);
     if (!alignment->minimize(stop, &out->log_scale, &out->iterations)) return false;
-    if (level == std::min(kAcrossLevel, coarsest_level)) {
-      out->epipolar_px = alignment->displacement_across();
-    }
+    if (level == std::min(kCoarseLevel, coarsest_level)) *coarse = alignment->turn_step().turn;
   }
   return true;
 }
@@ -82,6 +84,40 @@ bool start_cold(const Task& task, int coarsest_level, ScaleAlignment* alignment,
   return found.found;
 }
 
+/// Log-scale and turn of the right camera together, coarse to fine; false where too few points
+/// agree in the end.
+bool align_turned(const Task& task, int coarsest_level, double sigma, ScaleAlignment* alignment,
+                  TurnStep* out) {
+  SO3 turn;
+  for (int level = coarsest_level; level >= 0; --level) {
+    alignment->set_level(level);
+    for (int i = 0; i < kTurnIterations; ++i) {
+      alignment->linearize(sigma);
+      if (alignment->used() < task.config.min_points) return false;
+      alignment->fit_brightness();
+      alignment->fit_dispersion(alignment->sums());
+      *out = alignment->turn_step();
+      sigma += std::clamp(out->log_scale, -task.config.max_step, task.config.max_step);
+      task.workspace->points.turn_right(out->turn);
+      turn = SO3::exp(out->turn) * turn;
+    }
+  }
+  alignment->linearize(sigma);
+  const ScaleSums sums = alignment->sums();
+  out->turn = turn.log();
+  return sums.inliers >= task.config.min_inliers * sums.count && turn.log().norm() < kLargestTurn;
+}
+
+/// By one step from the best scale, or, where that would be long, anew from log-scale `start`.
+RightTurnEstimate find_turn(const Task& task, int coarsest_level, double start, double inlier_ratio,
+                            const Vec3& coarse, ScaleAlignment* alignment) {
+  TurnStep step = alignment->turn_step();
+  const double longest = std::max(step.turn.norm(), coarse.norm()) * task.projection.focal();
+  const bool far = longest > kFarTurnPx || inlier_ratio < task.config.min_inliers;
+  if (far && !align_turned(task, coarsest_level, start, alignment, &step)) return {};
+  return {true, step.turn, step.covariance.diagonal().cwiseSqrt(), step.scale_by_turn};
+}
+
 ScaleEstimate estimate_robust_scale(const Task& task, bool cold_start) {
   ScaleEstimate out;
   const ScaleOptimizerConfig& config = task.config;
@@ -92,7 +128,9 @@ ScaleEstimate estimate_robust_scale(const Task& task, bool cold_start) {
   if (cold_start && !start_cold(task, std::min(config.cold_level, top), &alignment, &out)) {
     return out;
   }
-  const bool aligned = descend(config, level, &alignment, &out);
+  const double start = out.log_scale;
+  Vec3 coarse = Vec3::Zero();
+  const bool aligned = descend(config, level, &alignment, &out, &coarse);
   out.num_points = alignment.used();
   out.gain = static_cast<double>(alignment.brightness().gain);
   out.bias = static_cast<double>(alignment.brightness().bias);
@@ -105,6 +143,7 @@ ScaleEstimate estimate_robust_scale(const Task& task, bool cold_start) {
   out.residual = alignment.residual();
   out.inlier_ratio = sums.inliers / sums.count;
   out.verdict = judge(config, out, cold_start);
+  out.turn = find_turn(task, level, start, out.inlier_ratio, coarse, &alignment);
   return out;
 }
 
@@ -144,20 +183,22 @@ ScaleOptimizer::ScaleOptimizer(ScaleOptimizer&& other) noexcept = default;
 ScaleOptimizer& ScaleOptimizer::operator=(ScaleOptimizer&& other) noexcept = default;
 
 ScaleEstimate ScaleOptimizer::estimate(const KeyframeSnapshot& keyframe, const ImagePyramid& right,
-                                       bool cold_start, const SE3& T_later_left) const {
+                                       bool cold_start, const SE3& T_later_left,
+                                       const SO3& turn) const {
   ScaleEstimate out;
   if (right.num_levels() == 0) {
     out.verdict = ScaleVerdict::kNoRightImage;
     return out;
   }
-  workspace_->points.prepare(keyframe, rig_, T_later_left, config_.min_relative_sigma);
+  const StereoRig rig = rig_.turned(turn);
+  workspace_->points.prepare(keyframe, rig, T_later_left, config_.min_relative_sigma);
   if (workspace_->points.size < config_.min_points || keyframe.pyramid == nullptr) return out;
   if (rig_.baseline() < kMinBaseline) {
     out.verdict = ScaleVerdict::kUnobservable;
     return out;
   }
   if (config_.method == ScaleMethod::kPaper) {
-    return estimate_paper_scale(config_, rig_, keyframe, right, cold_start, workspace_.get());
+    return estimate_paper_scale(config_, rig, keyframe, right, cold_start, workspace_.get());
   }
   const Task task{config_, *projection_,     *keyframe.pyramid,
                   right,   workspace_.get(), sparse_workspace_.get()};

@@ -95,6 +95,14 @@ struct ScaleOptimizerConfig {
   }
 };
 
+/// A turn of the right camera against its calibration, as one keyframe shows it.
+struct RightTurnEstimate {
+  bool valid = false;
+  Vec3 turn = Vec3::Zero();           ///< [rad]
+  Vec3 sigma = Vec3::Zero();          ///< Standard deviations, of independent residuals [rad].
+  Vec3 scale_by_turn = Vec3::Zero();  ///< d log-scale / d turn [1/rad].
+};
+
 /// Result of one scale optimization.
 struct ScaleEstimate {
   double log_scale = 0.0;  ///< Lengths of the snapshot are to be multiplied by exp(log_scale).
@@ -102,9 +110,11 @@ struct ScaleEstimate {
   double residual = 0.0;   ///< Robust RMS of the photometric residual [grey levels].
   double gain = 1.0;       ///< Brightness between the cameras: I_right ~ gain * I_left + bias.
   double bias = 0.0;
-  double ambiguity = 0.0;    ///< Of a cold start; 0 is unambiguous, 1 a tie.
-  double epipolar_px = 0.0;  ///< Displacement of the right image across the epipolar curves [px].
-  int num_points = 0;        ///< Used at the finest level.
+  double ambiguity = 0.0;  ///< Of a cold start; 0 is unambiguous, 1 a tie.
+  /// Turn of the right camera, about its own centre and in its own frame, with which the images
+  /// would agree best, beyond the one that was given; a log-scale that fits to it may differ.
+  RightTurnEstimate turn;
+  int num_points = 0;  ///< Used at the finest level.
   double inlier_ratio = 0.0;
   int iterations = 0;  ///< Over all levels.
   ScaleVerdict verdict = ScaleVerdict::kTooFewPoints;
@@ -132,9 +142,11 @@ class ScaleOptimizer {
   /// must have the size that their camera says. Where the verdict is kAccepted or kAmbiguous the
   /// estimate is a number with a sigma; else it must not be used. `T_later_left`: the left camera
   /// at the keyframe's instant into where it was when `right` was exposed, in the keyframe's unit
-  /// of length; the identity when both were exposed together.
+  /// of length; the identity when both were exposed together. `turn`: how the right camera is
+  /// turned about its own centre, against the rig.
   ScaleEstimate estimate(const KeyframeSnapshot& keyframe, const ImagePyramid& right,
-                         bool cold_start, const SE3& T_later_left = SE3()) const;
+                         bool cold_start, const SE3& T_later_left = SE3(),
+                         const SO3& turn = SO3()) const;
 
  private:
   ScaleOptimizerConfig config_;

@@ -63,6 +63,18 @@ void ScalePoints::prepare(const KeyframeSnapshot& keyframe, const StereoRig& rig
   padded = padded_size(k);
 }
 
+void ScalePoints::turn_right(const Vec3& turn) {
+  const Eigen::Matrix3f r = SO3::exp(turn).matrix().cast<float>();
+  const Eigen::Vector3f translation = r * Eigen::Vector3f(t[0], t[1], t[2]);
+  std::copy_n(translation.data(), 3, t);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(padded); ++i) {
+    const Eigen::Vector3f m = r * Eigen::Vector3f(mx[i], my[i], mz[i]);
+    mx[i] = m.x();
+    my[i] = m.y();
+    mz[i] = m.z();
+  }
+}
+
 void ScalePoints::take_every(int stride, const ScalePoints& all) {
   size = all.size / stride;
   padded = padded_size(static_cast<std::size_t>(size));

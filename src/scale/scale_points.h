@@ -32,6 +32,9 @@ struct ScalePoints {
   void prepare(const KeyframeSnapshot& keyframe, const StereoRig& rig, const SE3& T_later_left,
                double min_relative_sigma);
 
+  /// Turns the right camera about its own centre, by `turn` in its own frame [rad].
+  void turn_right(const Vec3& turn);
+
   /// Every `stride`-th point of `all`.
   void take_every(int stride, const ScalePoints& all);
 

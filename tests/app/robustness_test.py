@@ -61,6 +61,35 @@ class Robustness(SimTest):
             truth, live = self.fly("hall", *part, right_offset_ms=25)
             self.expect_whole(truth, live, 0.1)
 
+    def test_the_right_camera_is_turned_against_its_calibration(self):
+        # 1.3 px of yaw and 0.9 of pitch; taken as depth they lengthen the way by a tenth.
+        images, fitting, out = (self.folder / n for n in ("images", "fitting.yaml", "out.txt"))
+        self.expect(sovo("camera", "sim", "--world", "hall", "--trajectory", "loops", "--frames",
+                         120, "--calib", self.calibration, "--export", images, "--set",
+                         "sim.sensor.right_yaw_deg=0.4", "--set",
+                         "sim.sensor.right_pitch_deg=-0.3"), OK)
+        truth = read_tum(images / "groundtruth_cam0_tum.txt")
+        said = "the right camera is turned against its calibration"
+
+        def errors(*options):
+            """Of all poses, and of the later half as seen from its first one."""
+            result = self.expect(sovo("run", "--deterministic", "--dataset", images, "--out-live",
+                                      out, *options), OK)
+            poses = read_tum(out)
+            later = poses[60:]
+            return (result.stderr.count(said), largest_error(poses, truth, poses[0][0]),
+                    largest_error(later, truth, later[0][0]))
+
+        told, _, later = errors("--out-calib", fitting)
+        self.assertEqual(told, 2)  # when it is found, and in the end
+        self.assertLess(later, 0.02)
+        told, all_of_it, _ = errors("--calib", fitting)
+        self.assertEqual(told, 0)
+        self.assertLess(all_of_it, 0.02)
+        told, _, later = errors("--set", "right_turn.undo=false")
+        self.assertEqual(told, 0)
+        self.assertGreater(later, 0.1)
+
     def test_rows_are_exposed_one_after_the_other(self):
         # Taken as of one instant 40 to 70 mm off; the race is knocked after two seconds.
         rolling = ("--set", "readout_ms=16")

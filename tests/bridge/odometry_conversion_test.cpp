@@ -166,13 +166,29 @@ TEST(Diagnostics, LostIsAnErrorAndTrackingIsOk) {
             std::string::npos);
 }
 
+std::string value_of(const DiagnosticReport& report, const std::string& key) {
+  for (const auto& [name, value] : report.values) {
+    if (name == key) return value;
+  }
+  return "none";
+}
+
+TEST(Diagnostics, WarnOfARightCameraThatIsTurned) {
+  using Level = MessageTraits<msg::DiagnosticStatus>;
+  OdometryOutput output = test_output();
+  output.state = OdometryState::kTracking;
+  EXPECT_EQ(describe("", output, {}).level, Level::OK);
+  EXPECT_EQ(value_of(describe("", output, {}), "right_turn_deg"), "0.000 0.000 0.000");
+  output.decalibrated = true;
+  output.right_turn = M_PI / 180.0 * Vec3(0.25, -0.1, 1.0);
+  const DiagnosticReport report = describe("", output, {});
+  EXPECT_EQ(report.level, Level::WARN);
+  EXPECT_EQ(value_of(report, "right_turn_deg"), "0.250 -0.100 1.000");
+  output.state = OdometryState::kLost;
+  EXPECT_EQ(describe("", output, {}).level, Level::ERROR);
+}
+
 TEST(Diagnostics, SpeakOfLoopsWhereTheyAreClosed) {
-  const auto value_of = [](const DiagnosticReport& report, const std::string& key) {
-    for (const auto& [name, value] : report.values) {
-      if (name == key) return value;
-    }
-    return std::string("none");
-  };
   FeedStatus feed;
   EXPECT_EQ(value_of(describe("", test_output(), feed), "loops_closed"), "none");
   feed.loops = LoopStatus{40, 3, 1};

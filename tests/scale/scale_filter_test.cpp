@@ -194,6 +194,18 @@ TEST(ScaleFilter, SigmaCountsThatADisagreeingMeasurementMayBeRight) {
   EXPECT_LT(filter.path_sigma(), 2.0 * path_sigma);
 }
 
+TEST(ScaleFilter, ANewCalibrationMayHaveAnotherScale) {
+  ScaleFilter filter = locked_filter();
+  for (int i = 0; i < 20; ++i) filter.update(measure(0.0, 0.001));
+  EXPECT_EQ(filter.update(measure(0.05, 0.001)).verdict, ScaleVerdict::kInnovation);
+  filter.widen(-0.05);
+  EXPECT_GT(filter.sigma(), 0.05);
+  EXPECT_GT(filter.path_sigma(), 0.05);
+  const ScaleUpdate update = filter.update(measure(0.05, 0.001));
+  EXPECT_EQ(update.verdict, ScaleVerdict::kAccepted);
+  EXPECT_NEAR(update.log_scale_correction, 0.05, 0.001);
+}
+
 TEST(ScaleFilter, SixDisagreementsAskForAColdStart) {
   ScaleFilter filter = locked_filter();
   for (int i = 0; i < 20; ++i) filter.update(measure(0.0, 0.001));

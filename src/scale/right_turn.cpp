@@ -1,0 +1,114 @@
+#include "sovo/scale/right_turn.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+namespace sovo {
+
+namespace {
+
+constexpr double kUnseenPx = 0.15;  ///< Standard deviation from which on a keyframe tells nothing.
+constexpr double kExpectedWeight = 3.0;  ///< Keyframes that `expected_px` counts for.
+constexpr int kFewest = 5;               ///< Keyframes before a turn is believed.
+constexpr int kMany = 20;
+constexpr double kFar = 1.5;      ///< From the mean, over the gate.
+constexpr double kInDoubt = 2.5;  ///< Likewise: where a scale is not taken any more.
+constexpr int kKnocked = 6;       ///< Keyframes in a row that are far from the mean.
+constexpr double kLeast = 0.25;   ///< Of the threshold, once it was exceeded.
+constexpr double kSurePx = 0.25;
+constexpr double kSureSigmas = 1.3;
+
+}  // namespace
+
+RightTurn::RightTurn(const RightTurnConfig& config, double focal)
+    : config_(config), focal_(focal) {}
+
+void RightTurn::note(const RightTurnEstimate& found, const SO3& given) {
+  if (!found.valid || !found.turn.allFinite()) return;
+  const Vec3 total = focal_ * (SO3::exp(found.turn) * given).log();
+  for (int i = 0; i < 3; ++i) {
+    Axis& axis = axes_[static_cast<std::size_t>(i)];
+    axis.in_doubt = false;
+    if (focal_ * found.sigma[i] < kUnseenPx) note(total[i], &axis);
+  }
+  const bool before = decalibrated_;
+  decalibrated_ = config_.undo && exceeds(before ? kLeast : 1.0);
+  // With another turn the map becomes another one, which shows it better.
+  if (decalibrated_ && !before) {
+    for (Axis& axis : axes_) axis.turns.averaged = std::min(axis.turns.averaged, 1);
+  }
+  turn_ = decalibrated_ ? SO3::exp(certain_px() / focal_) : SO3();
+}
+
+/// Whether the turn about one of the axes exceeds this part of its threshold.
+bool RightTurn::exceeds(double part) const {
+  return std::any_of(axes_.begin(), axes_.end(), [part, this](const Axis& axis) {
+    return axis.turns.count >= kFewest && std::abs(axis.turns.mean) > part * threshold(axis.turns);
+  });
+}
+
+/// The means, fading where they are small parts of their thresholds, lest anything comes and goes.
+Vec3 RightTurn::certain_px() const {
+  Vec3 px = mean_px();
+  for (int i = 0; i < 3; ++i) {
+    const Turns& turns = axes_[static_cast<std::size_t>(i)].turns;
+    const double part = turns.count > 0 ? std::abs(turns.mean) / threshold(turns) : 0.0;
+    px[i] *= std::clamp(part / kLeast - 1.0, 0.0, 1.0);
+  }
+  return px;
+}
+
+bool RightTurn::in_doubt() const {
+  return config_.undo &&
+         std::any_of(axes_.begin(), axes_.end(), [](const Axis& axis) { return axis.in_doubt; });
+}
+
+void RightTurn::note(double px, Axis* axis) const {
+  const double away = std::abs(px - axis->turns.mean) / (config_.gate_sigmas * spread(axis->turns));
+  const bool known = axis->turns.count >= kFewest && std::abs(px - axis->turns.mean) > kSurePx;
+  axis->in_doubt = known && away > kInDoubt;
+  if (!known || away < kFar) {
+    axis->turns.add(px, config_.memory);
+    axis->astray = {};
+    return;
+  }
+  axis->astray.add(px, config_.memory);
+  const double moved = std::abs(axis->astray.mean - axis->turns.mean);
+  // Those that do not agree with each other either are the scatter of another place.
+  const bool knocked = axis->astray.count >= kKnocked && moved > threshold(axis->astray);
+  if (knocked || axis->astray.count >= 2 * kKnocked) {
+    axis->turns = std::exchange(axis->astray, {});
+    axis->in_doubt = false;
+  }
+}
+
+void RightTurn::Turns::add(double px, int memory) {
+  count = std::min(count + 1, memory);
+  averaged = std::min(averaged + 1, memory);
+  const double share = 1.0 / averaged;
+  const double innovation = px - mean;
+  mean += share * innovation;
+  variance = (1.0 - share) * (variance + share * innovation * innovation);
+}
+
+Vec3 RightTurn::mean_px() const {
+  return {axes_[0].turns.mean, axes_[1].turns.mean, axes_[2].turns.mean};
+}
+
+/// Of a keyframe's turn about the mean: what is expected, and what was seen.
+double RightTurn::spread(const Turns& turns) const {
+  const double expected = config_.expected_px * config_.expected_px;
+  return std::sqrt((kExpectedWeight * expected + turns.count * turns.variance) /
+                   (kExpectedWeight + turns.count));
+}
+
+/// Few keyframes know little of how they scatter. Where static depths hold the map, keyframes show
+/// more or less of a turn, but hardly any of many shows as little as `kSurePx`.
+double RightTurn::threshold(const Turns& turns) const {
+  const double scatter = (1.0 + 2.0 / turns.count) * spread(turns);
+  const double gate = std::max(config_.min_px, config_.gate_sigmas * scatter);
+  return turns.count < kMany ? gate : std::min(gate, kSurePx + kSureSigmas * scatter);
+}
+
+}  // namespace sovo

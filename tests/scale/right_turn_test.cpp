@@ -1,0 +1,163 @@
+#include "sovo/scale/right_turn.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <random>
+
+#include "support/numeric.h"
+
+namespace sovo {
+namespace {
+
+constexpr double kFocal = 400.0;
+
+/// Feeds keyframes that see `px`, whatever is undone.
+class Keyframes {
+ public:
+  explicit Keyframes(const RightTurnConfig& config = {}) : turn(config, kFocal) {}
+
+  void see(const Vec3& px, int count, double scatter_px = 0.02, double sigma_px = 0.03) {
+    std::normal_distribution<double> normal(0.0, scatter_px);
+    for (int i = 0; i < count; ++i) {
+      const Vec3 noise(normal(random_), normal(random_), normal(random_));
+      const SO3 given = turn.turn();
+      const SO3 total = SO3::exp((px + noise) / kFocal);
+      turn.note({true, (total * given.inverse()).log(), Vec3::Constant(sigma_px / kFocal), {}},
+                given);
+    }
+  }
+
+  RightTurn turn;
+
+ private:
+  std::mt19937 random_{1};
+};
+
+Vec3 undone_px(const RightTurn& turn) { return kFocal * turn.turn().log(); }
+
+TEST(RightTurn, OfOnePixelIsUndoneAfterFiveKeyframes) {
+  for (const Vec3& px : {Vec3(1, 0, 0), Vec3(0, -1, 0), Vec3(0, 0, 1)}) {
+    Keyframes keyframes;
+    keyframes.see(px, 4);
+    EXPECT_FALSE(keyframes.turn.decalibrated());
+    keyframes.see(px, 1);
+    EXPECT_TRUE(keyframes.turn.decalibrated());
+    EXPECT_LT((undone_px(keyframes.turn) - px).norm(), 0.1);
+    keyframes.see(px, 100);
+    EXPECT_LT((undone_px(keyframes.turn) - px).norm(), 0.02);
+  }
+}
+
+TEST(RightTurn, OfAFifthOfAPixelTakesMany) {
+  Keyframes keyframes;
+  keyframes.see({0, 0.2, 0}, 10);
+  EXPECT_FALSE(keyframes.turn.decalibrated());
+  EXPECT_TRUE(undone_px(keyframes.turn).isZero(0.0));
+  keyframes.see({0, 0.2, 0}, 60);
+  EXPECT_TRUE(keyframes.turn.decalibrated());
+  EXPECT_NEAR(undone_px(keyframes.turn).y(), 0.2, 0.02);
+}
+
+TEST(RightTurn, WhatManyKeyframesShowInPartIsOne) {
+  Keyframes keyframes;
+  for (int i = 0; i < 30; ++i) {
+    keyframes.see({0, 0.4, 0}, 1);
+    keyframes.see({0, 0.9, 0}, 1);
+  }
+  EXPECT_TRUE(keyframes.turn.decalibrated());
+  EXPECT_NEAR(undone_px(keyframes.turn).y(), 0.65, 0.15);
+}
+
+TEST(RightTurn, WhatScattersIsNone) {
+  Keyframes keyframes;
+  for (int i = 0; i < 20; ++i) {
+    keyframes.see({0.1, 0.25, -0.4}, 10, 0.25);
+    EXPECT_FALSE(keyframes.turn.decalibrated()) << i;
+  }
+}
+
+TEST(RightTurn, SomeKeyframesThatErrMoveNothing) {
+  Keyframes keyframes;
+  keyframes.see({0, 0, 0}, 40);
+  for (int i = 0; i < 10; ++i) {
+    keyframes.see({0, 2, 0}, 5);
+    keyframes.see({0, 0, 0}, 2);
+    EXPECT_FALSE(keyframes.turn.decalibrated());
+    EXPECT_LT(keyframes.turn.mean_px().norm(), 0.05);
+  }
+}
+
+TEST(RightTurn, AKnockIsNoticedAfterALongCalm) {
+  Keyframes keyframes;
+  keyframes.see({0, 0, 0}, 500);
+  keyframes.see({0, 0.8, 0}, 6);
+  EXPECT_TRUE(keyframes.turn.decalibrated());
+  EXPECT_NEAR(undone_px(keyframes.turn).y(), 0.8, 0.1);
+  keyframes.see({0, 2.0, 0}, 8);  // and another one
+  EXPECT_NEAR(undone_px(keyframes.turn).y(), 2.0, 0.1);
+  keyframes.see({0, 0, 0}, 30);  // bent back
+  EXPECT_FALSE(keyframes.turn.decalibrated());
+  EXPECT_TRUE(undone_px(keyframes.turn).isZero(0.0));
+}
+
+TEST(RightTurn, IsNotInDoubtForLong) {
+  Keyframes keyframes;
+  keyframes.see({0, 0, 0}, 40);
+  int in_doubt = 0;
+  for (int i = 0; i < 40; ++i) {
+    keyframes.see({0, i % 2 == 0 ? 0.6 : 1.6, 0}, 1);
+    in_doubt += keyframes.turn.in_doubt() ? 1 : 0;
+  }
+  EXPECT_GE(in_doubt, 8);
+  EXPECT_LE(in_doubt, 12);
+}
+
+TEST(RightTurn, IsInDoubtWhileAKeyframeShowsAnother) {
+  Keyframes keyframes;
+  keyframes.see({0, 0, 0}, 40);
+  EXPECT_FALSE(keyframes.turn.in_doubt());
+  for (int i = 0; i < 5; ++i) {
+    keyframes.see({0, 0.8, 0}, 1);
+    EXPECT_TRUE(keyframes.turn.in_doubt());
+  }
+  keyframes.see({0, 0.8, 0}, 1);  // now it is believed
+  EXPECT_FALSE(keyframes.turn.in_doubt());
+  keyframes.see({0, 0.8, 0}, 20);
+  keyframes.see({0, 0, 0}, 1);
+  EXPECT_TRUE(keyframes.turn.in_doubt());
+  keyframes.see({0, 0.8, 0}, 1);
+  EXPECT_FALSE(keyframes.turn.in_doubt());
+}
+
+TEST(RightTurn, AnAxisThatIsNotSeenSaysNothing) {
+  Keyframes keyframes;
+  keyframes.see({0, 3, 0}, 100, 0.02, 0.5);
+  EXPECT_FALSE(keyframes.turn.decalibrated());
+  EXPECT_EQ(keyframes.turn.mean_px().norm(), 0.0);
+  keyframes.turn.note({}, SO3());
+  EXPECT_EQ(keyframes.turn.mean_px().norm(), 0.0);
+}
+
+TEST(RightTurn, IsOnlyMeasuredWhereItIsNotToBeUndone) {
+  RightTurnConfig config;
+  config.undo = false;
+  Keyframes keyframes(config);
+  keyframes.see({1, 0, 0}, 50);
+  EXPECT_FALSE(keyframes.turn.decalibrated());
+  EXPECT_TRUE(undone_px(keyframes.turn).isZero(0.0));
+  EXPECT_NEAR(keyframes.turn.mean_px().x(), 1.0, 0.02);
+  keyframes.see({3, 0, 0}, 2);
+  EXPECT_FALSE(keyframes.turn.in_doubt());
+}
+
+TEST(RightTurn, WhatIsNoNumberIsForgotten) {
+  Keyframes keyframes;
+  keyframes.see({0, 1, 0}, 10);
+  const Vec3 nan = Vec3::Constant(std::numeric_limits<double>::quiet_NaN());
+  keyframes.turn.note({true, nan, Vec3::Constant(1e-5), {}}, keyframes.turn.turn());
+  EXPECT_NEAR(undone_px(keyframes.turn).y(), 1.0, 0.05);
+}
+
+}  // namespace
+}  // namespace sovo

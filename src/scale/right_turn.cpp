@@ -11,13 +11,13 @@ namespace {
 constexpr double kUnseenPx = 0.15;  ///< Standard deviation from which on a keyframe tells nothing.
 constexpr double kExpectedWeight = 3.0;  ///< Keyframes that `expected_px` counts for.
 constexpr int kFewest = 5;               ///< Keyframes before a turn is believed.
-constexpr int kMany = 20;
-constexpr double kFar = 1.5;      ///< From the mean, over the gate.
-constexpr double kInDoubt = 2.5;  ///< Likewise: where a scale is not taken any more.
-constexpr int kKnocked = 6;       ///< Keyframes in a row that are far from the mean.
-constexpr double kLeast = 0.25;   ///< Of the threshold, once it was exceeded.
-constexpr double kSurePx = 0.25;
-constexpr double kSureSigmas = 1.3;
+constexpr int kMany = 20;                ///< That are enough to know how little they show.
+constexpr double kFar = 1.5;             ///< From the mean, over the gate.
+constexpr double kInDoubt = 2.5;         ///< Likewise: where a scale is not taken any more.
+constexpr int kKnocked = 6;              ///< Keyframes in a row that are far from the mean.
+constexpr double kLeast = 0.25;          ///< Of the threshold, once it was exceeded.
+constexpr double kSurePx = 0.25;         ///< What lenses look like at most, where they always do.
+constexpr double kSureSigmas = 1.3;      ///< Nine of ten keyframes lie on this side of it.
 
 }  // namespace
 

@@ -13,6 +13,7 @@ constexpr int kLanes = ScalePoints::kLanes;
 constexpr double kMinDispersion = 0.01;  ///< Residuals a tenth of what is expected.
 constexpr double kMaxDispersion = 9.0;
 constexpr int kCell = 8;                 ///< Of the z-buffer [px].
+constexpr double kTurn = 1e-3;           ///< Of differences by turns of the right camera [rad].
 constexpr double kLargestSlope2 = 1e14;  ///< Of a grey level by a turn [1/rad^2].
 constexpr double kUnlikelyTurn = 0.02;   ///< Of the right camera [rad]: damps what nothing tells.
 
@@ -257,17 +258,19 @@ double ScaleAlignment::variance() const {
   return config_.variance_factor * squares / (information * information) + floor;
 }
 
-TurnStep ScaleAlignment::turn_step() const {
-  // How pixels move by a turn about each axis, by differences, whatever the lens.
-  constexpr double kTurn = 1e-3;
-  const ScaleProjections& at = workspace_->projections;
-  const std::array<ScaleProjections, 3>& turned = workspace_->turned_projections;
+void ScaleAlignment::project_turned() const {
   for (int axis = 0; axis < 3; ++axis) {
     workspace_->turned = workspace_->points;
     workspace_->turned.turn_right(kTurn * Vec3::Unit(axis));
     projection_.project(workspace_->turned, linearized_at_, level_,
                         &workspace_->turned_projections[static_cast<std::size_t>(axis)]);
   }
+}
+
+TurnStep ScaleAlignment::turn_step() const {
+  project_turned();
+  const ScaleProjections& at = workspace_->projections;
+  const std::array<ScaleProjections, 3>& turned = workspace_->turned_projections;
   const ScalePoints& points = workspace_->points;
   const ScaleSamples& samples = workspace_->samples;
   const Weighting w = weighting(config_, dispersion_, brightness_);

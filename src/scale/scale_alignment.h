@@ -42,8 +42,8 @@ struct ScaleSums {
 struct TurnStep {
   double log_scale = 0.0;
   Vec3 turn = Vec3::Zero();
-  Mat3 covariance = Mat3::Zero();     ///< Of `turn`, log-scale being unknown.
-  Vec3 scale_by_turn = Vec3::Zero();  ///< d log-scale / d turn of the best scale.
+  Mat3 covariance = Mat3::Zero();     ///< Of `turn`, log-scale being unknown [rad^2].
+  Vec3 scale_by_turn = Vec3::Zero();  ///< d (best log-scale) / d turn [1/rad].
 };
 
 /// Everything that an alignment stores; kept between calls to save the allocation.
@@ -96,7 +96,8 @@ class ScaleAlignment {
   /// the distribution of the residuals, times kappa, and no less than the floor.
   double variance() const;
 
-  /// The step from the last linearization.
+  /// The step from the last linearization, at the current level: of log-scale and of the right
+  /// camera's turn, which together lower the weighted residuals most.
   TurnStep turn_step() const;
 
   /// Zero-mean normalized cross-correlation of left and right values at log-scale `sigma`; -1 when
@@ -118,6 +119,10 @@ class ScaleAlignment {
   int level() const { return level_; }
 
  private:
+  /// The points as they lie where the right camera is turned a little about each of its axes, at
+  /// the last linearization: by differences, whatever the lens.
+  void project_turned() const;
+
   const ScaleOptimizerConfig& config_;
   const RightProjection& projection_;
   const ImagePyramid& left_;

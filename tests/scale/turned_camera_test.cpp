@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <numeric>
-
 #include "scale/scale_test_support.h"
 #include "sovo/scale/scale_alignment.h"
 
@@ -87,8 +85,6 @@ TEST_P(TurnedCamera, NothingIsFoundInImagesOfOtherThings) {
       ScaleOptimizer({}, v.rig).estimate(keyframe, *pyramid_of(other.right), false).turn.valid);
 }
 
-/// The prediction of residuals by a step, against residuals: H and b are right when the step from a
-/// small turn leads back, so here the points' own turning is held to the rig's.
 TEST_P(TurnedCamera, PointsTurnAsTheRigDoes) {
   const StereoView& v = view(GetParam());
   const auto keyframe = make_keyframe(v, scene(1), {});

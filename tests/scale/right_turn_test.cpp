@@ -130,6 +130,15 @@ TEST(RightTurn, IsInDoubtWhileAKeyframeShowsAnother) {
   EXPECT_FALSE(keyframes.turn.in_doubt());
 }
 
+TEST(RightTurn, AKeyframeThatShowsNoTurnPutsNothingInDoubt) {
+  Keyframes keyframes;
+  keyframes.see({0, 0, 0}, 40);
+  keyframes.see({0, 0.8, 0}, 1);
+  EXPECT_TRUE(keyframes.turn.in_doubt());
+  keyframes.see({0, 0.8, 0}, 1, 0.02, 0.5);
+  EXPECT_FALSE(keyframes.turn.in_doubt());
+}
+
 TEST(RightTurn, AnAxisThatIsNotSeenSaysNothing) {
   Keyframes keyframes;
   keyframes.see({0, 3, 0}, 100, 0.02, 0.5);

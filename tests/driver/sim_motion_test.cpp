@@ -58,7 +58,8 @@ TEST(MotionTest, LanesOfThePoolAre3600MillimetresApart) {
 
 /// No trajectory of the worlds jumps, turns on the spot like a machine, or dives into the ground.
 TEST(MotionTest, OwnTrajectoriesAreOnesThatVehiclesCouldFollow) {
-  for (const World world : {World::kLawn, World::kPool, World::kStreet, World::kHall}) {
+  for (const World world :
+       {World::kLawn, World::kPool, World::kStreet, World::kHall, World::kSand}) {
     for (const std::string& name : own_trajectories(world)) {
       const Motion motion = own_motion(world, name);
       constexpr double h = 0.05;

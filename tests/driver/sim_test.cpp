@@ -150,7 +150,7 @@ TEST_P(WarpTest, TruthCarriesLeftIntoRightThroughAnyCamera) {
 
 INSTANTIATE_TEST_SUITE_P(AllWorlds, WarpTest,
                          ::testing::Values(World::kLawn, World::kPool, World::kStreet,
-                                           World::kHall));
+                                           World::kHall, World::kSand));
 
 TEST(RendererTest, RowsOfARollingShutterAreOfTheirOwnInstants) {
   for (const World world : {World::kStreet, World::kPool}) {

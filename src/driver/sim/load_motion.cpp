@@ -150,6 +150,9 @@ Result<Motion> load_motion(const SimConfig& config, const StereoRig& rig) {
     case World::kLawn:
       level_above_ground(&*poses, 1.45);
       break;
+    case World::kSand:
+      level_above_ground(&*poses, 0.95);
+      break;
     case World::kPool:
       lift(&*poses, 0.9);
       break;

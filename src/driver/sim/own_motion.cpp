@@ -194,6 +194,29 @@ Motion fly_inspection() {
   });
 }
 
+/// A rover's round over sand, 43 m, which looks into every direction against the sun, pitching and
+/// rolling as its wheels find the ground.
+Motion drive_rover() {
+  constexpr double kSpeed = 0.7;
+  const auto way = walk({{6.0, 0.0},
+                         {3.5, 0.5 * kPi},
+                         {5.0, -0.3},
+                         {3.0, 0.5 * kPi + 0.3},
+                         {5.0, 0.2},
+                         {2.5, 0.5 * kPi - 0.2},
+                         {6.0, 0.4},
+                         {4.0, -0.5 * kPi},
+                         {8.0, 0.0}});
+  return sampled(way.back().s / kSpeed + 0.75, [way](double t) {
+    const WayPoint p = place_on(way, way_after(t, kSpeed));
+    const double bump = std::sin(2.1 * p.s) + 0.6 * std::sin(4.7 * p.s + 1.0);
+    const double tilt = std::sin(1.7 * p.s + 2.0) + 0.6 * std::sin(5.3 * p.s);
+    const Vec3 position(p.x, p.y, 0.95 + 0.012 * std::sin(1.3 * p.s) + 0.006 * bump);
+    const double down = 0.42 + 0.012 * bump;
+    return SE3(looking(p.heading + 0.006 * tilt, down, 0.014 * tilt), position);
+  });
+}
+
 struct NamedMotion {
   std::string name;
   Motion (*make)();
@@ -206,6 +229,7 @@ const std::vector<NamedMotion>& motions_of(World world) {
                                                 {"expressway", drive_expressway}};
   static const std::vector<NamedMotion> kHall{
       {"loops", fly_loops}, {"inspection", fly_inspection}, {"race", fly_race}};
+  static const std::vector<NamedMotion> kSand{{"traverse", drive_rover}};
   switch (world) {
     case World::kLawn:
       return kLawn;
@@ -214,9 +238,11 @@ const std::vector<NamedMotion>& motions_of(World world) {
     case World::kStreet:
       return kStreet;
     case World::kHall:
+      return kHall;
+    case World::kSand:
       break;
   }
-  return kHall;
+  return kSand;
 }
 
 }  // namespace

@@ -52,6 +52,11 @@ StereoRig own_rig(World world) {
       rig.right = camera(344.0, Distortion::kRadtan, {-0.281, 0.073, -0.0001, 0.00003}, 5.0, 8.0);
       place_right(0.11, {0.007, 0.002, -0.004});
       break;
+    case World::kSand:  // on a rover's mast
+      rig.left = camera(340.0, Distortion::kRadtan, {-0.21, 0.036, 0.0003, -0.0001}, 4.0, -3.0);
+      rig.right = camera(341.0, Distortion::kRadtan, {-0.208, 0.035, 0.0001, 0.0002}, -5.0, 2.0);
+      place_right(0.16, {-0.002, 0.004, 0.003});
+      break;
   }
   return rig;
 }

@@ -44,8 +44,9 @@ std::size_t distinct(const int* around, int step, std::array<int, 9>* surfaces) 
 
 }  // namespace
 
-Renderer::Renderer(const Scene& scene, const CameraModel& camera, const Lamps& lamps)
-    : scene_(&scene), lamps_(lamps), rays_(camera), view_(scene), shader_(scene, lamps) {
+Renderer::Renderer(const Scene& scene, const CameraModel& camera, const Lamps& lamps,
+                   const OwnShadow& shadow)
+    : scene_(&scene), lamps_(lamps), rays_(camera), view_(scene), shader_(scene, lamps, shadow) {
   const auto tiles = static_cast<std::size_t>(rays_.num_tiles());
   range_.resize(tiles * RayTable::kTilePixels);
   surface_.resize(range_.size());

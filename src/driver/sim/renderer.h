@@ -25,8 +25,10 @@ struct RenderedImage {
 /// that the tile may see, pixels in which surfaces meet are cast again at eight places.
 class Renderer {
  public:
-  /// The scene must outlive the renderer. `lamps`: of the vehicle, in the camera's frame.
-  Renderer(const Scene& scene, const CameraModel& camera, const Lamps& lamps = {});
+  /// The scene must outlive the renderer. `lamps` and `shadow`: of the vehicle,
+  /// in the camera's frame.
+  Renderer(const Scene& scene, const CameraModel& camera, const Lamps& lamps = {},
+           const OwnShadow& shadow = {});
 
   /// The picture from a pose at time `t` of the world [s].
   void render(const SE3& T_world_camera, double t, RenderedImage* image);

@@ -110,6 +110,20 @@ void Shader::add_caustics(const Spots& spots, BatchFloats* light) const {
   cross_nets(scene_->caustic_strength, net.mean(), spots.end, a.data(), b.data(), light->data());
 }
 
+/// Takes the sun's share of the light where the vehicle stands before it. `round`: where light
+/// differs over a surface.
+void Shader::add_own_shadow(const RayBatch& rays, float sun_and_sky, const Spots* round, int end,
+                            BatchFloats* light) const {
+  for (std::size_t i = 0; i < static_cast<std::size_t>(end); ++i) {
+    const float all = round != nullptr ? round->light[i] : sun_and_sky;
+    const float sun = 1.0F - std::min(1.0F, scene_->ambient / std::max(1e-6F, all));
+    if (!(sun > 0.0F)) continue;
+    const Eigen::Vector3f point =
+        rays.range[i] * Eigen::Vector3f(rays.dx[i], rays.dy[i], rays.dz[i]);
+    (*light)[i] *= 1.0F - sun * shadow_.hidden(point, to_sun_);
+  }
+}
+
 void Shader::light(const SurfaceView& view, RayBatch* rays, BatchFloats* light) const {
   const Surface& s = scene_->surfaces[static_cast<std::size_t>(view.surface)];
   const Material& material = scene_->materials[static_cast<std::size_t>(s.material)];
@@ -126,6 +140,9 @@ void Shader::light(const SurfaceView& view, RayBatch* rays, BatchFloats* light) 
   if (round) light_cylinder(view, *rays, to_sun_, scene_->ambient, scene_->sun, &spots);
   for (std::size_t i = 0; i < end; ++i) {
     (*light)[i] *= s.tint * (round ? spots.light[i] : s.light) * lamps_.ambient;
+  }
+  if (shadow_.falls()) {
+    add_own_shadow(*rays, s.light, round ? &spots : nullptr, spots.end, light);
   }
   if (s.foot_shade > 0.0F) {
     const auto height = static_cast<float>(T_world_camera_.translation().z());

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "sovo/driver/sim/lamps.h"
+#include "sovo/driver/sim/own_shadow.h"
 #include "sovo/driver/sim/pattern_lookup.h"
 #include "sovo/driver/sim/ray_batch.h"
 #include "sovo/driver/sim/scene_view.h"
@@ -13,7 +14,8 @@ namespace sovo::sim {
 /// a pixel sees them. Batches must not be empty; the shader pads them.
 class Shader {
  public:
-  Shader(const Scene& scene, Lamps lamps) : scene_(&scene), lamps_(std::move(lamps)) {}
+  Shader(const Scene& scene, Lamps lamps, OwnShadow shadow)
+      : scene_(&scene), lamps_(std::move(lamps)), shadow_(std::move(shadow)) {}
 
   /// Moves the camera, and the water, to time `t` [s].
   void update(const SE3& T_world_camera, double t);
@@ -30,11 +32,14 @@ class Shader {
  private:
   void reflect(const Material& material, const Spots& spots, BatchFloats* light) const;
   void add_caustics(const Spots& spots, BatchFloats* light) const;
+  void add_own_shadow(const RayBatch& rays, float sun_and_sky, const Spots* round, int end,
+                      BatchFloats* light) const;
   float sky_of(const Eigen::Vector3f& ray, float pixel_angle) const;
   float hills(double azimuth, double elevation, float pixel_angle, float beyond) const;
 
   const Scene* scene_;
   Lamps lamps_;
+  OwnShadow shadow_;
   SE3 T_world_camera_;
   Mat3 R_world_camera_ = Mat3::Identity();
   Eigen::Vector3f to_sun_ = Eigen::Vector3f::Zero();  ///< In the camera's frame.

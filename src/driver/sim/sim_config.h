@@ -12,6 +12,7 @@ enum class World {
   kPool,    ///< A swimming pool's floor seen by a vehicle that mows it in lanes of 3.6 m.
   kStreet,  ///< Houses, trees and cars along a drive.
   kHall,    ///< A machine hall around a small aircraft.
+  kSand,    ///< Sand that a rover drives over.
 };
 
 /// A side of the pair, or neither.
@@ -35,11 +36,12 @@ enum class TrajectoryBody {
 };
 
 /// Names of enum values in configuration files, found by argument-dependent lookup.
-constexpr std::array<std::pair<World, const char*>, 4> enum_names(World) {
+constexpr std::array<std::pair<World, const char*>, 5> enum_names(World) {
   return {{{World::kLawn, "lawn"},
            {World::kPool, "pool"},
            {World::kStreet, "street"},
-           {World::kHall, "hall"}}};
+           {World::kHall, "hall"},
+           {World::kSand, "sand"}}};
 }
 constexpr const char* name_of(World world) {
   return enum_names(world)[static_cast<std::size_t>(world)].second;
@@ -162,6 +164,7 @@ struct SimConfig {
   std::string trajectory_times;
   TrajectoryBody trajectory_body = TrajectoryBody::kAuto;
   Traffic traffic = Traffic::kNone;
+  bool own_shadow = false;
   int threads = 2;
   LampConfig lamps;
   SensorConfig sensor;
@@ -176,7 +179,7 @@ struct SimConfig {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v("world", world, "lawn, pool, street or hall");
+    v("world", world, "lawn, pool, street, hall or sand");
     v("seed", seed, "of the world and the noise");
     v("frame_rate", frame_rate, "pairs a second of the world's time [Hz]; 0: what suits it");
     v("trajectory", trajectory,
@@ -186,6 +189,7 @@ struct SimConfig {
     v("trajectory_body", trajectory_body, "of which body the trajectory file's poses are");
     v("traffic", traffic,
       "vehicles that move in the street: none, car or lorry ahead, overtaking or oncoming");
+    v("own_shadow", own_shadow, "a rover carries the cameras, whose shadow moves with them");
     v("threads", threads, "1 or 2: cameras rendered at once; changes no pixel");
     v("lamps", lamps, "lamps of the vehicle, which move with its cameras");
     v("sensor", sensor, "what the cameras do to the light");

@@ -63,6 +63,10 @@ Result<Motion> find_motion(const SimConfig& config, const StereoRig& rig) {
   return Error{motion.error() + "; the world's own trajectories are: " + known};
 }
 
+OwnShadow own_shadow(const SimConfig& config, const StereoRig& rig, Side side) {
+  return config.own_shadow ? OwnShadow(rig, side) : OwnShadow();
+}
+
 Result<void> check_lamps(const LampConfig& lamps) {
   if (lamps.count < 0 || lamps.count > 2) return Error{"lamps.count must be 0, 1 or 2"};
   if (!(lamps.spacing_m >= 0.0 && lamps.spacing_m <= 10.0)) {
@@ -128,9 +132,11 @@ SimSource::SimSource(const SimConfig& config, Calibration calibration, Motion mo
       frame_rate_(config.frame_rate > 0.0 ? config.frame_rate : own_frame_rate(config.world)),
       delivered_(choose_pairs(config, motion_, frame_rate_)),
       left_(scene_, calibration_.rig.left,
-            place_lamps(config.lamps, calibration_.rig, Side::kLeft, scene_.haze)),
+            place_lamps(config.lamps, calibration_.rig, Side::kLeft, scene_.haze),
+            own_shadow(config, calibration_.rig, Side::kLeft)),
       right_(scene_, calibration_.rig.right,
-             place_lamps(config.lamps, calibration_.rig, Side::kRight, scene_.haze)),
+             place_lamps(config.lamps, calibration_.rig, Side::kRight, scene_.haze),
+             own_shadow(config, calibration_.rig, Side::kRight)),
       truth_(scene_, calibration_.rig.left),
       left_sensor_(config.sensor, calibration_.rig.left.width, calibration_.rig.left.height),
       right_sensor_(config.sensor, calibration_.rig.right.width, calibration_.rig.right.height),

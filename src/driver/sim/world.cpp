@@ -11,9 +11,11 @@ Scene build_scene(World world, const Motion& motion, std::uint64_t seed, Traffic
     case World::kStreet:
       return build_street(motion, seed, traffic);
     case World::kHall:
+      return build_hall(motion, seed);
+    case World::kSand:
       break;
   }
-  return build_hall(motion, seed);
+  return build_sand(motion, seed);
 }
 
 }  // namespace sovo::sim

@@ -41,5 +41,6 @@ Scene build_lawn(const Motion& motion, std::uint64_t seed);
 Scene build_pool(const Motion& motion, std::uint64_t seed);
 Scene build_street(const Motion& motion, std::uint64_t seed, Traffic traffic);
 Scene build_hall(const Motion& motion, std::uint64_t seed);
+Scene build_sand(const Motion& motion, std::uint64_t seed);
 
 }  // namespace sovo::sim

@@ -127,6 +127,18 @@ Result<void> check_local_contrast(const LocalContrastConfig& c) {
   return {};
 }
 
+Result<void> check_weak_texture(const WeakTextureConfig& c) {
+  constexpr double kLeastShare = 0.01;
+  if (!(c.least_share >= kLeastShare && c.least_share <= 1.0)) {
+    return Error{"vo.weak_texture.least_share must be 0.01 to 1"};
+  }
+  if (!(c.to_gradient >= 0.0 && c.to_gradient < c.from_gradient)) {
+    return Error{"vo.weak_texture.to_gradient must not be negative, and below from_gradient"};
+  }
+  if (!(c.least_rms >= 0.0)) return Error{"vo.weak_texture.least_rms must not be negative"};
+  return {};
+}
+
 /// What the selection of pixels could not work with.
 Result<void> check_selection(const PixelSelectorConfig& s) {
   constexpr int kLeastRegion = 8;
@@ -144,6 +156,9 @@ Result<void> check_selection(const PixelSelectorConfig& s) {
   }
   if (!(s.reselect_below > 0.0 && s.reselect_below < 1.0 && s.reselect_above > 1.0)) {
     return Error{"vo.selection.reselect_below must be between 0 and 1, reselect_above above 1"};
+  }
+  if (!(s.min_spread >= 0.0 && s.min_spread < 1.0)) {
+    return Error{"vo.selection.min_spread must be at least 0 and below 1"};
   }
   return {};
 }
@@ -247,6 +262,7 @@ Result<void> check_config(const AppConfig& config) {
   if (auto backend = check_backend(config.odometry); !backend) return backend;
   if (auto weights = check_weights(config.odometry.vo); !weights) return weights;
   if (auto selection = check_selection(config.odometry.vo.selection); !selection) return selection;
+  if (auto weak = check_weak_texture(config.odometry.vo.weak_texture); !weak) return weak;
   if (auto assist = check_assist(config.odometry.assist); !assist) return assist;
   if (auto light = check_local_contrast(config.odometry.local_contrast); !light) return light;
   if (auto loops = check_loops(config); !loops) return loops;

@@ -77,6 +77,10 @@ ReferenceLevel thinned(const ReferenceLevel& all, std::size_t most) {
   return out;
 }
 
+RobustNorm norm_for(const TrackerConfig& config, const TrackingReference& reference) {
+  return {reference.threshold_share * config.huber, reference.threshold_share * config.cutoff};
+}
+
 /// Prior on a frame's brightness: that of the reference.
 struct BrightnessPrior {
   Vec8 weight = Vec8::Zero();
@@ -189,14 +193,14 @@ void WarpedPoints::reserve(std::size_t size) {
 }
 
 double CoarseTracker::residuals(const ReferenceLevel& level, const ImageF& image, const SE3& T,
-                                const BrightnessTransfer& transfer, double cutoff,
+                                const BrightnessTransfer& transfer, const RobustNorm& norm,
                                 Linearization* out) {
   warped_.reserve(level.size() + kTrackedGroup);
   ResidualSums sums;
   run_kernel<ResidualPass>(
       TrackedPoints{level, image, Warp(level.camera, T)},
       ResidualConfig{static_cast<float>(transfer.gain), static_cast<float>(transfer.bias),
-                     static_cast<float>(config_.huber), static_cast<float>(cutoff)},
+                     static_cast<float>(norm.huber), static_cast<float>(norm.cutoff)},
       warped_.arrays(), &sums);
   warped_.n = sums.n;
   out->in_view = sums.in_view;
@@ -248,16 +252,16 @@ void CoarseTracker::normal_equations(const BrightnessTransfer& transfer, double 
 CoarseTracker::Linearization CoarseTracker::linearize(const TrackingReference& reference, int level,
                                                       const ImageF& image, const SE3& T,
                                                       const BrightnessTransfer& transfer,
-                                                      double cutoff) {
+                                                      const RobustNorm& norm) {
   Linearization out;
-  residuals(reference.levels[static_cast<std::size_t>(level)], image, T, transfer, cutoff, &out);
+  residuals(reference.levels[static_cast<std::size_t>(level)], image, T, transfer, norm, &out);
   normal_equations(transfer, reference.affine.b, &out);
   return out;
 }
 
 CoarseTracker::LevelOutcome CoarseTracker::align_level(const TrackingReference& reference,
                                                        int level, const ImageF& image,
-                                                       double exposure_s, double* cutoff, SE3* T,
+                                                       double exposure_s, RobustNorm* norm, SE3* T,
                                                        Affine* affine, int max_iterations) {
   const ReferenceLevel& points = reference.levels[static_cast<std::size_t>(level)];
   const auto transfer_of = [&](const Affine& a) {
@@ -268,10 +272,10 @@ CoarseTracker::LevelOutcome CoarseTracker::align_level(const TrackingReference& 
 
   LevelOutcome out;
   Linearization now;
-  residuals(points, image, *T, transfer_of(*affine), *cutoff, &now);
-  while (now.saturated > kMaxSaturated && *cutoff < config_.cutoff * kMaxCutoffFactor) {
-    *cutoff *= 2.0;
-    residuals(points, image, *T, transfer_of(*affine), *cutoff, &now);
+  residuals(points, image, *T, transfer_of(*affine), *norm, &now);
+  while (now.saturated > kMaxSaturated && norm->cutoff < config_.cutoff * kMaxCutoffFactor) {
+    norm->cutoff *= 2.0;
+    residuals(points, image, *T, transfer_of(*affine), *norm, &now);
   }
   normal_equations(transfer_of(*affine), reference.affine.b, &now);
   double energy = now.energy + prior.energy(*affine, now.in_view);
@@ -292,7 +296,7 @@ CoarseTracker::LevelOutcome CoarseTracker::align_level(const TrackingReference& 
       break;
     }
     Linearization next;
-    residuals(points, image, new_T, transfer_of(new_affine), *cutoff, &next);
+    residuals(points, image, new_T, transfer_of(new_affine), *norm, &next);
     const double new_energy = next.energy + prior.energy(new_affine, next.in_view);
     accepted = new_energy < energy;
     if (accepted) {
@@ -320,16 +324,17 @@ TrackingResult CoarseTracker::try_hypothesis(const TrackingReference& reference,
   result.T_current_reference = start;
   result.affine = guess;
   const int levels = std::min(static_cast<int>(reference.levels.size()), pyramid.num_levels());
+  const RobustNorm usual = norm_for(config_, reference);
   bool repeated = false;
   LevelOutcome outcome;
   for (int l = levels - 1; l >= 0; --l) {
-    double cutoff = config_.cutoff;
-    outcome = align_level(reference, l, pyramid.level(l), exposure_s, &cutoff,
-                          &result.T_current_reference, &result.affine,
-                          kMaxIterations[static_cast<std::size_t>(std::min(l, 5))]);
+    RobustNorm norm = usual;
+    outcome =
+        align_level(reference, l, pyramid.level(l), exposure_s, &norm, &result.T_current_reference,
+                    &result.affine, kMaxIterations[static_cast<std::size_t>(std::min(l, 5))]);
     double& best = best_rmse_[static_cast<std::size_t>(l)];
     if (!outcome.finite || outcome.rmse > kLevelRejectFactor * best) return result;
-    if (cutoff > config_.cutoff && !repeated) {
+    if (norm.cutoff > usual.cutoff && !repeated) {
       repeated = true;
       ++l;
       continue;
@@ -375,15 +380,15 @@ double CoarseTracker::score_as_it_is(const TrackingReference& reference, int lev
   const BrightnessTransfer transfer =
       brightness_transfer(reference.affine, reference.exposure_s, affine, exposure_s);
   Linearization at;
-  const double energy = residuals(points, image, T, transfer, config_.cutoff, &at);
+  const double energy = residuals(points, image, T, transfer, norm_for(config_, reference), &at);
   return badness(std::sqrt(energy), at.inliers, points.size());
 }
 
 double CoarseTracker::score_aligned(const TrackingReference& reference, int level,
                                     const ImageF& image, double exposure_s, Affine affine, SE3* T) {
-  double cutoff = config_.cutoff;
+  RobustNorm norm = norm_for(config_, reference);
   const LevelOutcome o =
-      align_level(reference, level, image, exposure_s, &cutoff, T, &affine, kRankIterations);
+      align_level(reference, level, image, exposure_s, &norm, T, &affine, kRankIterations);
   if (!o.finite) return kExplainsNothing;
   return badness(o.rmse, o.last.inliers, reference.levels[static_cast<std::size_t>(level)].size());
 }

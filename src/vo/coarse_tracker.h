@@ -32,6 +32,12 @@ struct LastTracking {
   std::optional<SE3> expected = std::nullopt;  ///< T_current_reference of the new frame.
 };
 
+/// Residuals above `huber` count linearly, those above `cutoff` a constant [grey levels].
+struct RobustNorm {
+  double huber = 9.0;
+  double cutoff = 20.0;
+};
+
 /// Direct image alignment of a frame with the tracking reference: pose (6) and affine brightness
 /// (2), Levenberg-Marquardt from the coarsest level to the finest (DSO, Sec. 3.1, "frame
 /// tracking").
@@ -63,7 +69,7 @@ class CoarseTracker {
   };
   Linearization linearize(const TrackingReference& reference, int level, const ImageF& image,
                           const SE3& T_current_reference, const BrightnessTransfer& transfer,
-                          double cutoff);
+                          const RobustNorm& norm);
 
  private:
   struct LevelOutcome {
@@ -72,12 +78,12 @@ class CoarseTracker {
     Linearization last;
   };
   double residuals(const ReferenceLevel& level, const ImageF& image, const SE3& T,
-                   const BrightnessTransfer& transfer, double cutoff, Linearization* out);
+                   const BrightnessTransfer& transfer, const RobustNorm& norm, Linearization* out);
   /// Correlation and sharpness of the result's pose.
   static void compare(const ReferenceLevel& level, const ImageF& image, TrackingResult* result);
   void normal_equations(const BrightnessTransfer& transfer, double reference_b, Linearization* out);
   LevelOutcome align_level(const TrackingReference& reference, int level, const ImageF& image,
-                           double exposure_s, double* cutoff, SE3* T, Affine* affine,
+                           double exposure_s, RobustNorm* norm, SE3* T, Affine* affine,
                            int max_iterations);
   /// How badly a motion explains a level, as it is or once aligned there; lower is better.
   double score_as_it_is(const TrackingReference& reference, int level, const ImageF& image,

@@ -158,12 +158,33 @@ struct WindowConfig {
   }
 };
 
+/// Thresholds on brightness are made for images in which a pixel beside its place is off by tens of
+/// grey levels. Where texture is weak, it is hardly off by their noise, and whatever is strong, a
+/// shadow that moves with the vehicle, outweighs all that is right: so they come down, linearly in
+/// the gradient, a quarter of a reference's pixels having less.
+struct WeakTextureConfig {
+  double from_gradient = 12.0;  ///< They begin to [grey levels/px],
+  double to_gradient = 8.0;     ///< and end [grey levels/px],
+  double least_share = 0.25;    ///< at this share,
+  double least_rms = 3.0;       ///< or where the cutoff is so many times the RMS of residuals.
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("from_gradient", from_gradient,
+      "thresholds come down where a quarter of the pixels has less gradient [grey levels/px]");
+    v("to_gradient", to_gradient, "down to this one [grey levels/px]");
+    v("least_share", least_share, "where this share is left of them; 1: they never do");
+    v("least_rms", least_rms, "and where the cutoff is this x the RMS of the residuals");
+  }
+};
+
 struct DirectConfig {
   TrackerConfig tracker;
   KeyframeConfig keyframe;
   PixelSelectorConfig selection;
   PointConfig points;
   WindowConfig window;
+  WeakTextureConfig weak_texture;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -172,6 +193,7 @@ struct DirectConfig {
     v("selection", selection, "choice of the pixels that become points");
     v("points", points, "immature points");
     v("window", window, "bundle adjustment");
+    v("weak_texture", weak_texture, "thresholds on brightness of images with little texture");
   }
 };
 

@@ -134,7 +134,7 @@ void DirectOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
   }
   window_.update_geometry();
   history_.record(window_poses());
-  publish_reference();
+  publish_reference(std::nullopt);
 }
 
 MapResult DirectOdometry::map(const TrackedFrame& tracked, const KeyframeStereo& stereo,
@@ -214,7 +214,7 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
     }
   }
   erase_marked_points(&window_);
-  publish_reference();
+  publish_reference(tracked.tracking.rmse);
   take_snapshot();
   result.left = marginalize(timer);
   add_immature_points(stereo.depths, timer);
@@ -326,11 +326,29 @@ std::vector<WindowPose> DirectOdometry::window_poses() const {
   return poses;
 }
 
-void DirectOdometry::publish_reference() {
+double DirectOdometry::share_of_thresholds(const TrackingReference& reference,
+                                           std::optional<double> rmse) const {
+  AlignedVector<float> u = reference.levels[0].u;
+  AlignedVector<float> v = reference.levels[0].v;
+  if (!rmse) {
+    // The pixels of a first keyframe that have a depth are those of strong texture.
+    for (const ImmaturePoint& p : window_.newest().immature) {
+      u.push_back(p.u);
+      v.push_back(p.v);
+    }
+  }
+  if (u.empty()) return 1.0;
+  return threshold_share(config_.weak_texture, lower_gradient(window_.newest().image(), u, v),
+                         config_.tracker.cutoff, rmse.value_or(0.0));
+}
+
+void DirectOdometry::publish_reference(std::optional<double> rmse) {
   auto next = std::make_shared<TrackingReference>(build_tracking_reference(window_, num_levels_));
   next->log_scale = log_scale();
   next->covariance = history_.covariance();
   next->gradient_scatter = gradient_scatter_;
+  next->threshold_share = share_of_thresholds(*next, rmse);
+  window_.newest().huber_share = next->threshold_share;
   const std::lock_guard lock(reference_mutex_);
   reference_ = std::move(next);
 }

@@ -67,7 +67,9 @@ class DirectOdometry final : public MonocularBackend {
   std::vector<KeyframeState> marginalize(const MapTimer& timer);
   void keep_point(const Point& point, double rho_unit, KeyframePoints* points) const;
   KeyframeState state_without_active_points(const Keyframe& keyframe) const;
-  void publish_reference();
+  /// `rmse`: of the last frame that was tracked; nothing at a map's beginning.
+  void publish_reference(std::optional<double> rmse);
+  double share_of_thresholds(const TrackingReference& reference, std::optional<double> rmse) const;
   std::vector<WindowPose> window_poses() const;
   void take_snapshot();
   TrackedFrame track_hypotheses(const MonoFrame& frame,

@@ -120,7 +120,8 @@ void prefetch_pattern(const Window& window, int target, const PatternProjection&
 }
 
 void sum_pattern(const ImageF& image, const PatternBrightness& brightness, const Point& point,
-                 const WindowConfig& config, const PatternProjection& at, LinearizedResidual* out) {
+                 const WindowConfig& config, double huber_share, const PatternProjection& at,
+                 LinearizedResidual* out) {
   const PatternInput in = {.image = &image,
                            .offset = at.offset.data(),
                            .fx = at.fx.data(),
@@ -131,7 +132,7 @@ void sum_pattern(const ImageF& image, const PatternBrightness& brightness, const
                            .bias = brightness.bias,
                            .frozen_gain = brightness.frozen_gain,
                            .frozen_host_b = brightness.frozen_host_b,
-                           .huber = static_cast<float>(config.huber),
+                           .huber = static_cast<float>(config.huber * huber_share),
                            .squared_gradient_constant = static_cast<float>(
                                config.gradient_constant * config.gradient_constant)};
   alignas(32) std::array<float, 16> totals;
@@ -157,7 +158,7 @@ float linearize_projected(const Window& window, const WindowConfig& config, int 
   }
   geometric_jacobian(window.camera(), g, projection, out);
   sum_pattern(target_frame.image(), {g.gain, g.bias, g.frozen_gain, g.frozen_host_b}, point, config,
-              projection, out);
+              window[host].huber_share, projection, out);
   fill_cross(out);
   const Verdict verdict = judge(window[host], target_frame, out->raw_energy, is_textured(*out));
   out->state = verdict.state;

@@ -59,9 +59,11 @@ struct PatternBrightness {
   float frozen_gain = 1.0F, frozen_host_b = 0.0F;
 };
 
-/// Samples a projected pattern: `gram`, `gram_r`, `rr` and `raw_energy` of `out`.
+/// Samples a projected pattern: `gram`, `gram_r`, `rr` and `raw_energy` of `out`. `huber_share`: of
+/// its host.
 void sum_pattern(const ImageF& image, const PatternBrightness& brightness, const Point& point,
-                 const WindowConfig& config, const PatternProjection& at, LinearizedResidual* out);
+                 const WindowConfig& config, double huber_share, const PatternProjection& at,
+                 LinearizedResidual* out);
 
 /// Both halves: linearizes the residual of `point` (host keyframe index `host`) into keyframe index
 /// `target`.

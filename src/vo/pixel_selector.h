@@ -19,7 +19,9 @@ struct PixelSelectorConfig {
   int mask_border = 3;              ///< Nearest it comes to a masked pixel (pattern + 1) [px].
   double reselect_below = 0.8;      ///< Select anew when fewer than this times the wanted number,
   double reselect_above = 4.0;      ///< or more than this times it, were found.
-  int initial_block = 3;            ///< First side of the blocks of which each gives one pixel.
+  /// Where pixels are spread over less than this share of the regions, texture is weak elsewhere.
+  double min_spread = 0.35;
+  int initial_block = 3;  ///< First side of the blocks of which each gives one pixel.
   /// Of the directions and of the thinning; follows from that of the whole odometry.
   int seed = 1;
 
@@ -34,6 +36,8 @@ struct PixelSelectorConfig {
     v("mask_border", mask_border, "least distance to a masked pixel [px]");
     v("reselect_below", reselect_below, "select anew below this share of the wanted number");
     v("reselect_above", reselect_above, "select anew above this multiple of the wanted number");
+    v("min_spread", min_spread,
+      "with pixels in a smaller share of the regions less texture is asked for");
     v("initial_block", initial_block, "first side of the selection blocks [px]");
   }
 };
@@ -82,6 +86,7 @@ class PixelSelector {
   void compute_medians(const ImageF& image);
   void compute_thresholds();
   void select_enough(const ImagePyramid& pyramid, int wanted, std::vector<SelectedPixel>* out);
+  double spread_of(const std::vector<SelectedPixel>& selected) const;
   bool lower_threshold(const std::vector<SelectedPixel>& selected, int wanted);
   void raise_threshold();
   void erode_mask(const ImageU8& mask);

@@ -80,7 +80,7 @@ void linearize_static(const StereoRig& rig, const WindowConfig& config, const Ke
   if (!projection.in_view) return;
   const auto gain = static_cast<float>(host.right_brightness.gain);
   sum_pattern(image, {gain, static_cast<float>(host.right_brightness.bias), gain, 0.0F}, point,
-              config, projection, out);
+              config, host.huber_share, projection, out);
   out->du_rho = static_cast<float>(at->derivative.x());
   out->dv_rho = static_cast<float>(at->derivative.y());
   out->centre_u = static_cast<float>(at->pixel.x());

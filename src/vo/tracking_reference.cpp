@@ -277,6 +277,29 @@ TrackingReference build_tracking_reference(const Window& window, int num_levels)
   return ref;
 }
 
+double lower_gradient(const ImageF& image, std::span<const float> u, std::span<const float> v) {
+  std::vector<float> squared;
+  squared.reserve(u.size());
+  for (std::size_t i = 0; i < u.size(); ++i) {
+    const int x = static_cast<int>(u[i]);
+    const int y = static_cast<int>(v[i]);
+    const float gx = image.at(x + 1, y) - image.at(x - 1, y);
+    const float gy = image.at(x, y + 1) - image.at(x, y - 1);
+    squared.push_back(gx * gx + gy * gy);
+  }
+  const auto quarter = squared.begin() + static_cast<std::ptrdiff_t>(squared.size() / 4);
+  std::nth_element(squared.begin(), quarter, squared.end());
+  return 0.5 * std::sqrt(static_cast<double>(*quarter));
+}
+
+double threshold_share(const WeakTextureConfig& config, double gradient, double cutoff,
+                       double rmse) {
+  const double texture = std::clamp(
+      (gradient - config.to_gradient) / (config.from_gradient - config.to_gradient), 0.0, 1.0);
+  const double weak = config.least_share + (1.0 - config.least_share) * texture;
+  return std::clamp(config.least_rms * rmse / cutoff, weak, 1.0);
+}
+
 TrackingReference moved_by_rows(const TrackingReference& reference, const RowShift& rows,
                                 const SE3& T_current_reference) {
   TrackingReference out = reference;

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "sovo/geometry/camera_model.h"
+#include "sovo/vo/direct_config.h"
 #include "sovo/vo/monocular_backend.h"
 #include "sovo/vo/window.h"
 
@@ -24,6 +26,7 @@ struct TrackingReference : ReferenceKeyframe {
   double gradient_scatter = 1.0;
   RowShift rows;  ///< Of its image.
   std::vector<ReferenceLevel> levels;
+  double threshold_share = 1.0;       ///< Of thresholds on brightness, see `WeakTextureConfig`.
   std::size_t num_window_points = 0;  ///< Points that were splatted.
 };
 
@@ -31,6 +34,16 @@ struct TrackingReference : ReferenceKeyframe {
 /// it is an inlier is splatted with the weight of its depth information; coarser levels sum 2x2;
 /// empty neighbours are filled once (DSO, Sec. 3.1).
 TrackingReference build_tracking_reference(const Window& window, int num_levels);
+
+/// Gradient that a quarter of some pixels remain below [grey levels/px]. Precondition: there are
+/// some, and none is at the image's edge.
+double lower_gradient(const ImageF& image, std::span<const float> u, std::span<const float> v);
+
+/// What `WeakTextureConfig` leaves of thresholds, least_share to 1, by a reference's gradient and
+/// the residuals' RMS, against the full `cutoff` [grey levels]. Precondition: least_share is 0 to
+/// 1, to_gradient below from_gradient.
+double threshold_share(const WeakTextureConfig& config, double gradient, double cutoff,
+                       double rmse);
 
 /// The reference as an image is compared with that was read out row after row: each point lies
 /// where it must for its own row in the reference's image, and for the one in which it is seen by

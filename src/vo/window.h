@@ -90,6 +90,7 @@ struct Keyframe {
   RowShift rows;  ///< Of a rolling shutter, in the map's unit.
 
   double outlier_threshold = 0.0;  ///< Energy of a whole pattern.
+  double huber_share = 1.0;        ///< Of its points' Huber threshold, see `WeakTextureConfig`.
   int points_hosted = 0;           ///< Ever active points of this host.
   int points_gone = 0;             ///< Of them, marginalized or dropped.
   bool leaving = false;

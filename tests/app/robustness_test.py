@@ -47,6 +47,13 @@ class Robustness(SimTest):
             origin = live[-1 if direction else 0][0]
             self.assertLess(largest_error(live, truth, origin), 0.005 * path)
 
+    def test_the_vehicles_own_shadow_on_bare_sand(self):
+        # From rest on: what is strong moves with the cameras, and the sand hardly differs.
+        for world in (1, 3):
+            truth, live = self.fly("sand", "--frames", 60, "--set", "sim.own_shadow=true", "--set",
+                                   f"sim.seed={world}", calibration=())
+            self.expect_whole(truth, live, 0.02)
+
     def test_the_light_changes_at_once(self):
         truth, live = self.fly("hall", "--frames", 110, light_factor=0.35, light_from_s=1.5,
                                light_until_s=3)

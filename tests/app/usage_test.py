@@ -42,6 +42,8 @@ class Configuration(CommandTest):
                            "vo.keyframe.approach=-1", "vo.window.static_weight=nan",
                            "vo.selection.border=3", "vo.selection.least_offset=8",
                            "assist.few_points=0.9", "assist.good_keyframes=0",
+                           "vo.weak_texture.least_share=0", "vo.weak_texture.to_gradient=20",
+                           "vo.weak_texture.least_rms=-1", "vo.selection.min_spread=1",
                            "lighting=lamp", "local_contrast.radius=0", "local_contrast.floor=0",
                            "loops.place_step=0", "loops.keypoints.per_image=10",
                            "loops.max_places=1", "loops.matching.sigma_px=0",

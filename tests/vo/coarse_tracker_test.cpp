@@ -27,6 +27,9 @@ TrackingReference scene_reference(const SyntheticScene& scene, const Affine& aff
   return build_tracking_reference(window, window.newest().pyramid->num_levels());
 }
 
+/// A way along the view, and a little to the side.
+const SE3 kMovedBesideBars(SO3::exp(Vec3(0.004, -0.006, 0.002)), Vec3(0.04, -0.02, -0.08));
+
 class TrackerJacobian : public ::testing::TestWithParam<double> {};
 
 TEST_P(TrackerJacobian, AgreesWithCentralDifferencesOnASmoothImage) {
@@ -77,8 +80,8 @@ TEST_P(TrackerJacobian, AgreesWithCentralDifferencesOnASmoothImage) {
   TrackerConfig config;
   config.huber = huber;
   CoarseTracker tracker(config);
-  const auto found = tracker.linearize(reference, 0, image, T,
-                                       brightness_transfer(reference.affine, 0, affine, 0), 1e3);
+  const auto found = tracker.linearize(
+      reference, 0, image, T, brightness_transfer(reference.affine, 0, affine, 0), {huber, 1e3});
   ASSERT_EQ(found.inliers, 203);
   const Vec8 s = H.diagonal().cwiseSqrt().cwiseInverse();
   const Mat8 expected = s.asDiagonal() * H * s.asDiagonal();
@@ -94,8 +97,8 @@ TEST(CoarseTracker, SaturatedResidualsLeaveTheNormalEquations) {
   const TrackingReference reference = scene_reference(scene);
   const ImagePyramidPtr image = scene_view(scene, small_camera(), SE3(SO3(), Vec3(0.1, 0, 0)));
   CoarseTracker tracker{TrackerConfig()};
-  const auto wide = tracker.linearize(reference, 0, image->level(0), SE3(), {}, 1e3);
-  const auto narrow = tracker.linearize(reference, 0, image->level(0), SE3(), {}, 5.0);
+  const auto wide = tracker.linearize(reference, 0, image->level(0), SE3(), {}, {9.0, 1e3});
+  const auto narrow = tracker.linearize(reference, 0, image->level(0), SE3(), {}, {9.0, 5.0});
   EXPECT_EQ(wide.inliers, wide.in_view);
   EXPECT_EQ(narrow.in_view, wide.in_view);
   EXPECT_LT(narrow.inliers, wide.inliers);
@@ -171,6 +174,78 @@ TEST(CoarseTracker, TakesTheHypothesisThatFits) {
   ASSERT_TRUE(result.good);
   EXPECT_EQ(result.hypothesis, 1);
   EXPECT_LT((result.T_current_reference * truth.inverse()).log().norm(), 0.006);
+}
+
+/// Weak texture that moves as the world does, and bars that move with the camera.
+ImageF with_bars(const ImageF& scene) {
+  ImageF image = scene;
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = 0; x < image.width(); ++x) {
+      float& grey = image.at(x, y);
+      grey = 110.0F + 0.12F * (grey - 128.0F);
+      const bool bar = y > image.height() / 2 && (y / 16) % 2 == 0 && x > 160;
+      if (bar) grey -= 40.0F;
+    }
+  }
+  return image;
+}
+
+/// What is found where an eighth of what is seen moves with the camera.
+TrackingResult tracked_beside_bars(double share) {
+  const SyntheticScene scene(3);
+  const CameraModel camera = small_camera();
+  Window window(camera);
+  const ImagePyramidPtr first = pyramid_of(with_bars(scene_view(scene, camera, SE3())->level(0)));
+  Keyframe& k = window.insert(make_keyframe(1, first, SE3(), {}));
+  k.points = scene_points(scene, camera, k.image(), {SE3()}, 0, 4);
+  for (Point& p : k.points) p.hessian = 1e4;
+  window.update_geometry();
+  TrackingReference reference = build_tracking_reference(window, first->num_levels());
+  reference.threshold_share = share;
+  const ImagePyramidPtr second =
+      pyramid_of(with_bars(scene_view(scene, camera, kMovedBesideBars.inverse())->level(0)));
+  CoarseTracker tracker{TrackerConfig()};
+  const std::vector<SE3> start = {SE3()};
+  return tracker.track(reference, *second, 0.0, {}, start, {});
+}
+
+TEST(CoarseTracker, WithLowThresholdsAShadowDoesNotOutweighWeakTexture) {
+  const TrackingResult low = tracked_beside_bars(0.25);
+  ASSERT_TRUE(low.good);
+  EXPECT_LT((low.T_current_reference * kMovedBesideBars.inverse()).log().norm(), 0.002);
+  const TrackingResult usual = tracked_beside_bars(1.0);
+  EXPECT_GT((usual.T_current_reference * kMovedBesideBars.inverse()).log().norm(), 0.008);
+}
+
+TEST(WeakTexture, BringsThresholdsDownUnlessResidualsAreLarge) {
+  const WeakTextureConfig c;
+  EXPECT_EQ(threshold_share(c, 30.0, 20.0, 0.0), 1.0);
+  EXPECT_EQ(threshold_share(c, c.from_gradient, 20.0, 1.0), 1.0);
+  EXPECT_EQ(threshold_share(c, c.to_gradient, 20.0, 0.0), c.least_share);
+  EXPECT_EQ(threshold_share(c, 0.0, 20.0, 1.0), c.least_share);
+  const double middle = 0.5 * (c.from_gradient + c.to_gradient);
+  EXPECT_NEAR(threshold_share(c, middle, 20.0, 0.0), 0.5 * (1.0 + c.least_share), 1e-12);
+  EXPECT_NEAR(threshold_share(c, 0.0, 20.0, 4.0), c.least_rms * 4.0 / 20.0, 1e-12);
+  EXPECT_EQ(threshold_share(c, 0.0, 20.0, 9.0), 1.0);
+}
+
+TEST(WeakTexture, AQuarterOfTheGradientsIsLower) {
+  ReferenceLevel level;
+  ImageF image(64, 32);
+  // Ramps along the rows, steeper every eight of them.
+  for (int y = 0; y < 32; ++y) {
+    for (int x = 0; x < 64; ++x)
+      image.at(x, y) = static_cast<float>(x) * 0.25F * static_cast<float>(y / 8);
+  }
+  for (int row : {4, 12, 20, 28}) {  // slopes 0, 1/4, 1/2, 3/4
+    for (int x = 10; x < 50; ++x) {
+      level.u.push_back(static_cast<float>(x));
+      level.v.push_back(static_cast<float>(row));
+      level.rho.push_back(1.0F);
+      level.colour.push_back(image.at(x, row));
+    }
+  }
+  EXPECT_NEAR(lower_gradient(image, level.u, level.v), 0.25, 1e-6);
 }
 
 std::vector<SE3> turns_of(double step, int most) {

@@ -202,6 +202,32 @@ TEST(PixelSelector, TheThresholdFollowsTheContrast) {
   EXPECT_EQ(selector.threshold_share(), 1.0);
 }
 
+/// A horizon gives enough pixels by itself, and the sand before it none.
+TEST(PixelSelector, WhereStrongPixelsLieTogetherLessIsAskedOfTheOthers) {
+  constexpr int kWanted = 800;
+  ImageF image = textured(640, 480);
+  for (int y = 0; y < image.height(); ++y) {
+    const bool horizon = y >= 60 && y < 110;
+    for (int x = 0; x < image.width(); ++x) {
+      float& grey = image.at(x, y);
+      grey = 128.0F + (horizon ? 1.0F : 0.15F) * (grey - 128.0F);
+    }
+  }
+  const ImagePyramid pyramid = plain_pyramid(image);
+  const auto on_sand = [&](double min_spread) {
+    PixelSelectorConfig config;
+    config.min_spread = min_spread;
+    PixelSelector selector(config);
+    const auto pixels = select(&selector, pyramid, kWanted);
+    EXPECT_GE(pixels.size(), 0.8 * kWanted);
+    const auto count = std::count_if(pixels.begin(), pixels.end(),
+                                     [](const SelectedPixel& p) { return p.y >= 120; });
+    return static_cast<double>(count) / static_cast<double>(pixels.size());
+  };
+  EXPECT_LT(on_sand(0.0), 0.4) << "the test needs pixels that lie together";
+  EXPECT_GT(on_sand(PixelSelectorConfig().min_spread), 0.6);
+}
+
 TEST(PixelSelector, CoarseBlocksTakeOverWhereTheFineLevelIsWeak) {
   // A ramp of 6 grey levels a pixel beside flat ground: below the level-0 threshold of 7, above
   // the level-1 threshold (12 grey levels a level-1 pixel against 7 * sqrt(.75)).

@@ -104,7 +104,8 @@ TEST(SameBits, TrackersNormalEquations) {
   TrackingReference reference;
   reference.levels = {noise_level(image)};
   CoarseTracker tracker({});
-  const auto found = tracker.linearize(reference, 0, image, plain_pose(1), {1.01, -2.0}, 20.0);
+  const auto found =
+      tracker.linearize(reference, 0, image, plain_pose(1), {1.01, -2.0}, {9.0, 20.0});
   EXPECT_GT(found.inliers, 300);
   EXPECT_LT(found.inliers, found.in_view);
   Checksum sum;

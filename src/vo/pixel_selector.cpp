@@ -176,8 +176,9 @@ void PixelSelector::select_enough(const ImagePyramid& pyramid, int wanted,
   }
 }
 
-/// Share of the regions over which the pixels are spread: as many of them with equally many pixels
-/// each would have the same sum of squares.
+/// Share of the regions over which the pixels are spread: over so many of them, evenly, two pixels
+/// would lie in the same one as often (Simpson's index, which few pixels do not bias). 1 where no
+/// two lie together.
 double PixelSelector::spread_of(const std::vector<SelectedPixel>& selected) const {
   const int side = std::max(8, config_.threshold_block);
   std::vector<double> pixels(medians_.size(), 0.0);
@@ -186,11 +187,11 @@ double PixelSelector::spread_of(const std::vector<SelectedPixel>& selected) cons
     const int ry = std::min(p.y / side, regions_y_ - 1);
     pixels[static_cast<std::size_t>(ry * regions_x_ + rx)] += 1.0;
   }
-  double squares = 0.0;
-  for (const double n : pixels) squares += n * n;
-  if (selected.empty()) return 1.0;
+  double together = 0.0;  // pairs of pixels
+  for (const double n : pixels) together += n * (n - 1.0);
+  if (together == 0.0) return 1.0;
   const auto all = static_cast<double>(selected.size());
-  return all * all / (squares * static_cast<double>(pixels.size()));
+  return all * (all - 1.0) / (together * static_cast<double>(pixels.size()));
 }
 
 /// When blocks as small as can be gave too few pixels, or all that were found lie together: on the
@@ -199,8 +200,8 @@ bool PixelSelector::lower_threshold(const std::vector<SelectedPixel>& selected, 
   const double least = std::min(1.0, config_.least_offset / config_.threshold_offset);
   const bool enough = static_cast<double>(selected.size()) >= config_.reselect_below * wanted;
   const bool few = !enough && block_ <= kSmallBlock;
-  if (!(threshold_share_ > least) || !(few || spread_of(selected) < config_.min_spread))
-    return false;
+  if (!(threshold_share_ > least)) return false;
+  if (!few && spread_of(selected) >= config_.min_spread) return false;
   threshold_share_ = std::max(least, kLower * threshold_share_);
   since_lowered_ = 0;
   block_ = std::clamp(config_.initial_block, 1, kMaxBlock);

@@ -228,6 +228,16 @@ TEST(PixelSelector, WhereStrongPixelsLieTogetherLessIsAskedOfTheOthers) {
   EXPECT_GT(on_sand(PixelSelectorConfig().min_spread), 0.6);
 }
 
+/// However few are wanted: in most regions there is one or none then.
+TEST(PixelSelector, FewPixelsOfAnEvenTextureDoNotLieTogether) {
+  const ImagePyramid pyramid = plain_pyramid(textured(1248, 384));
+  for (const int wanted : {60, 150, 400, 2000}) {
+    PixelSelector selector;
+    for (int i = 0; i < 3; ++i) select(&selector, pyramid, wanted);
+    EXPECT_EQ(selector.threshold_share(), 1.0) << wanted;
+  }
+}
+
 TEST(PixelSelector, CoarseBlocksTakeOverWhereTheFineLevelIsWeak) {
   // A ramp of 6 grey levels a pixel beside flat ground: below the level-0 threshold of 7, above
   // the level-1 threshold (12 grey levels a level-1 pixel against 7 * sqrt(.75)).

@@ -82,6 +82,63 @@ TEST_F(Map, ScatterOfGradientsGoesOnToTheReference) {
   EXPECT_GE(keyframes, 2);
 }
 
+/// With a fifteenth of the contrast thresholds are at their least, for frames and for the window.
+TEST_F(Map, ThresholdsComeDownWhereTextureIsWeak) {
+  EXPECT_EQ(vo_.tracking_reference()->threshold_share, 1.0);
+  EXPECT_EQ(vo_.window().newest().huber_share, 1.0);
+  const auto pale = [&](const SE3& pose, int index) {
+    MonoFrame frame = frame_at(scene_, pose, index);
+    ImageF image = frame.pyramid->level(0);
+    apply_brightness(0.07, 100.0, &image);
+    frame.pyramid = pyramid_of(std::move(image));
+    return frame;
+  };
+  const MonoFrame first = pale(SE3(), 0);
+  std::vector<StartPoint> points;
+  for (const SelectedPixel& pixel : vo_.select_pixels(first, 700)) {
+    const double depth = scene_.depth(small_camera(), SE3(), Vec2(pixel.x, pixel.y));
+    points.push_back({pixel, {static_cast<float>(1.0 / depth), static_cast<float>(0.02 / depth)}});
+  }
+  vo_.begin(first, SE3(), points, nullptr);
+  const double least = DirectConfig().weak_texture.least_share;
+  EXPECT_EQ(vo_.tracking_reference()->threshold_share, least);
+  EXPECT_EQ(vo_.window().newest().huber_share, least);
+  int keyframes = 0;
+  for (int i = 1; i <= 20; ++i) {
+    const TrackedFrame tracked = vo_.track(pale(drive(i), i), 0.0);
+    ASSERT_TRUE(tracked.tracking.good) << i;
+    if (!vo_.map(tracked, {}, nullptr).is_keyframe) continue;
+    ++keyframes;
+    EXPECT_EQ(vo_.tracking_reference()->threshold_share, least);
+    EXPECT_EQ(vo_.window().newest().huber_share, least);
+  }
+  EXPECT_GE(keyframes, 2);
+}
+
+/// Of a first keyframe all pixels count, for those that have a depth are the strong ones.
+TEST_F(Map, PixelsWithoutDepthTellOfWeakTextureToo) {
+  ImageF image = first_.pyramid->level(0);
+  for (int y = 0; y < image.height(); ++y) {
+    for (int x = image.width() / 3; x < image.width(); ++x) {
+      image.at(x, y) = 100.0F + 0.07F * image.at(x, y);
+    }
+  }
+  MonoFrame frame = first_;
+  frame.pyramid = pyramid_of(std::move(image));
+  std::vector<StartPoint> points;
+  for (int y = 10; y + 10 < small_camera().height; y += 4) {
+    for (int x = 10; x + 10 < small_camera().width; x += 4) {
+      const bool strong = x + 8 < small_camera().width / 3;
+      SelectedPixel pixel;
+      pixel.x = static_cast<std::int16_t>(x);
+      pixel.y = static_cast<std::int16_t>(y);
+      points.push_back({pixel, {0.5F, strong ? 0.01F : 0.0F}});
+    }
+  }
+  vo_.begin(frame, SE3(), points, nullptr);
+  EXPECT_LT(vo_.tracking_reference()->threshold_share, 1.0);
+}
+
 TEST_F(Map, BeginsAnewWithoutWhatItHeld) {
   for (int i = 1; i <= 10; ++i) {
     vo_.map(vo_.track(frame_at(scene_, drive(i), i), 0.0), {}, nullptr);

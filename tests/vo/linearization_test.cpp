@@ -157,6 +157,26 @@ Mat9 balanced(const Mat9& H, const Mat9& reference) {
   return s.asDiagonal() * H * s.asDiagonal();
 }
 
+/// A host of weak texture has its own part of Huber's threshold, in whatever it is seen.
+TEST_F(WindowJacobian, ThePatternHasItsHostsShareOfHubersThreshold) {
+  config_.huber = 4.0;
+  linearize_any();
+  const LinearizedResidual usual = linearized_;
+  window_[1].huber_share = 0.25;  // of the target: nothing
+  linearize_any();
+  EXPECT_EQ(linearized_.raw_energy, usual.raw_energy);
+  window_[0].huber_share = 0.25;
+  linearize_any();
+  const LinearizedResidual low = linearized_;
+  EXPECT_LT(low.raw_energy, 0.8F * usual.raw_energy) << "the test needs residuals beyond it";
+  window_[0].huber_share = 1.0;
+  config_.huber = 1.0;
+  linearize_any();
+  EXPECT_EQ(linearized_.raw_energy, low.raw_energy);
+  EXPECT_EQ(linearized_.gram, low.gram);
+  EXPECT_EQ(linearized_.gram_r, low.gram_r);
+}
+
 TEST_F(WindowJacobian, GeometryAgreesWithCentralDifferencesAtTheCentrePixel) {
   linearize_now();
   const auto f = [&](const Vec9& s) { return project(point().u, point().v, s); };

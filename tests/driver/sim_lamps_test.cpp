@@ -4,24 +4,16 @@
 #include <cmath>
 #include <numbers>
 
+#include "driver/sim_vehicle_rig.h"
 #include "sovo/driver/sim/lamps.h"
 #include "sovo/driver/sim/renderer.h"
 #include "sovo/driver/sim/sim_source.h"
 #include "sovo/driver/sim/world.h"
-#include "support/cameras.h"
 
 namespace sovo::sim {
 namespace {
 
 using Eigen::Vector3f;
-
-StereoRig lamp_rig() {
-  StereoRig rig;
-  rig.left = test::make_camera(160, 112, 95, 95, 79.5, 55.5);
-  rig.right = test::make_camera(160, 112, 96, 95, 81, 54);
-  rig.T_right_left = SE3(SO3::exp({0.006, -0.3, 0.004}), Vec3(-0.2, 0.002, 0.003));
-  return rig;
-}
 
 /// One lamp between the cameras.
 LampConfig one_lamp() {
@@ -32,7 +24,7 @@ LampConfig one_lamp() {
 }
 
 TEST(LampsTest, LightFallsWithDistanceTiltAndTheBeam) {
-  const StereoRig rig = lamp_rig();
+  const StereoRig rig = vehicle_rig();
   const Lamps lamps = place_lamps(one_lamp(), rig, Side::kLeft, 0.0);
   ASSERT_EQ(lamps.lamps.size(), 1U);
   const Vector3f from = lamps.lamps[0].position;
@@ -51,7 +43,7 @@ TEST(LampsTest, LightFallsWithDistanceTiltAndTheBeam) {
 }
 
 TEST(LampsTest, BothCamerasHaveTheSameLamps) {
-  const StereoRig rig = lamp_rig();
+  const StereoRig rig = vehicle_rig();
   LampConfig config = one_lamp();
   config.count = 2;
   config.above_m = 0.3;
@@ -71,7 +63,7 @@ TEST(LampsTest, BothCamerasHaveTheSameLamps) {
 }
 
 TEST(LampsTest, HazeTakesLightAndSendsSomeBack) {
-  const StereoRig rig = lamp_rig();
+  const StereoRig rig = vehicle_rig();
   const Lamps clear = place_lamps(one_lamp(), rig, Side::kLeft, 0.0);
   const Lamps hazy = place_lamps(one_lamp(), rig, Side::kLeft, 0.5);
   const Vector3f far = clear.lamps[0].position + 3.0F * Vector3f::UnitZ();
@@ -97,7 +89,7 @@ TEST(LampsTest, InTheDarkOnlyTheBeamIsSeen) {
   config.world = World::kHall;
   const Motion motion = own_motion(config.world);
   const Scene scene = build_scene(config.world, motion, 1);
-  const StereoRig rig = lamp_rig();
+  const StereoRig rig = vehicle_rig();
   LampConfig lamp = one_lamp();
   lamp.ambient = 0.0;
   lamp.beam_deg = 20.0;

@@ -2,26 +2,18 @@
 
 #include <algorithm>
 
+#include "driver/sim_vehicle_rig.h"
 #include "sovo/driver/sim/own_shadow.h"
 #include "sovo/driver/sim/renderer.h"
 #include "sovo/driver/sim/world.h"
-#include "support/cameras.h"
 
 namespace sovo::sim {
 namespace {
 
 using Eigen::Vector3f;
 
-StereoRig shadow_rig() {
-  StereoRig rig;
-  rig.left = test::make_camera(160, 112, 95, 95, 79.5, 55.5);
-  rig.right = test::make_camera(160, 112, 96, 95, 81, 54);
-  rig.T_right_left = SE3(SO3::exp({0.006, -0.3, 0.004}), Vec3(-0.2, 0.002, 0.003));
-  return rig;
-}
-
 TEST(OwnShadowTest, HidesTheSunBehindTheHousingAndNowhereElse) {
-  StereoRig rig = shadow_rig();
+  StereoRig rig = vehicle_rig();
   rig.T_right_left = SE3(SO3(), Vec3(-0.2, 0.0, 0.0));
   const OwnShadow shadow(rig, Side::kLeft);
   const Vector3f to_sun = Vector3f(0.0F, -1.0F, -1.0F).normalized();
@@ -43,7 +35,7 @@ TEST(OwnShadowTest, HidesTheSunBehindTheHousingAndNowhereElse) {
 }
 
 TEST(OwnShadowTest, BothCamerasSeeTheSameShadow) {
-  const StereoRig rig = shadow_rig();
+  const StereoRig rig = vehicle_rig();
   const OwnShadow left(rig, Side::kLeft);
   const OwnShadow right(rig, Side::kRight);
   const Vec3 to_sun = Vec3(0.3, -0.7, -0.6).normalized();
@@ -67,7 +59,7 @@ struct Views {
 Views views_at(const SE3& pose, double t) {
   const Motion motion = own_motion(World::kSand);
   const Scene scene = build_scene(World::kSand, motion, 1);
-  const StereoRig rig = shadow_rig();
+  const StereoRig rig = vehicle_rig();
   Views views;
   Renderer(scene, rig.left).render(pose, t, &views.bright);
   Renderer(scene, rig.left, {}, OwnShadow(rig, Side::kLeft)).render(pose, t, &views.shaded);

@@ -149,8 +149,8 @@ TEST_P(WarpTest, TruthCarriesLeftIntoRightThroughAnyCamera) {
 }
 
 INSTANTIATE_TEST_SUITE_P(AllWorlds, WarpTest,
-                         ::testing::Values(World::kLawn, World::kPool, World::kStreet,
-                                           World::kHall, World::kSand));
+                         ::testing::Values(World::kLawn, World::kPool, World::kStreet, World::kHall,
+                                           World::kSand));
 
 TEST(RendererTest, RowsOfARollingShutterAreOfTheirOwnInstants) {
   for (const World world : {World::kStreet, World::kPool}) {

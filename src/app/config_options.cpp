@@ -127,6 +127,27 @@ Result<void> check_local_contrast(const LocalContrastConfig& c) {
   return {};
 }
 
+Result<void> check_co_moving(const CoMovingConfig& c) {
+  constexpr int kSmallestCell = 4;
+  constexpr int kLargestCell = 256;
+  if (c.cell < kSmallestCell || c.cell > kLargestCell) {
+    return Error{"vo.co_moving.cell must be 4 to 256"};
+  }
+  if (!(c.min_gradient >= 0.0 && c.min_displacement > 0.0 && c.majority > 0.0)) {
+    return Error{
+        "vo.co_moving: min_gradient must not be negative, min_displacement and majority be "
+        "positive"};
+  }
+  if (!(c.better_match > 0.0 && c.better_match <= 1.0)) {
+    return Error{"vo.co_moving.better_match must be above 0 and at most 1"};
+  }
+  if (!(c.stays_below > 0.0 && c.stays_below <= c.moves_above)) {
+    return Error{"vo.co_moving.stays_below must be positive, and at most moves_above"};
+  }
+  if (c.keyframes < 1) return Error{"vo.co_moving.keyframes must be at least 1"};
+  return {};
+}
+
 Result<void> check_weak_texture(const WeakTextureConfig& c) {
   constexpr double kLeastShare = 0.01;
   if (!(c.least_share >= kLeastShare && c.least_share <= 1.0)) {
@@ -263,6 +284,7 @@ Result<void> check_config(const AppConfig& config) {
   if (auto weights = check_weights(config.odometry.vo); !weights) return weights;
   if (auto selection = check_selection(config.odometry.vo.selection); !selection) return selection;
   if (auto weak = check_weak_texture(config.odometry.vo.weak_texture); !weak) return weak;
+  if (auto along = check_co_moving(config.odometry.vo.co_moving); !along) return along;
   if (auto assist = check_assist(config.odometry.assist); !assist) return assist;
   if (auto light = check_local_contrast(config.odometry.local_contrast); !light) return light;
   if (auto loops = check_loops(config); !loops) return loops;

@@ -12,8 +12,9 @@ constexpr std::size_t kMostWaiting = 10;
 constexpr double kNanosecond = 1e-9;
 constexpr double kWorthTelling = 0.1;  // a correction of so many metres
 
-/// What loop closing needs of it.
-KeyframeOutput without_points(const KeyframeOutput& keyframe) {
+}  // namespace
+
+KeyframeOutput needed_for_loops(const KeyframeOutput& keyframe) {
   KeyframeOutput out;
   out.id = keyframe.id;
   out.segment = keyframe.segment;
@@ -26,11 +27,11 @@ KeyframeOutput without_points(const KeyframeOutput& keyframe) {
   out.covariance = keyframe.covariance;
   out.left = keyframe.left;
   out.right = keyframe.right;
+  out.T_later_left = keyframe.T_later_left;
   out.halvings = keyframe.halvings;
+  out.co_moving_mask = keyframe.co_moving_mask;
   return out;
 }
-
-}  // namespace
 
 LoopSink::LoopSink(const LoopConfig& config, const StaticMatcherConfig& matcher, bool background,
                    OnPlace on_place)
@@ -60,7 +61,7 @@ void LoopSink::on_keyframe(const KeyframeOutput& keyframe) {
   }
   {
     const std::lock_guard lock(queue_mutex_);
-    queue_.push_back(without_points(keyframe));
+    queue_.push_back(needed_for_loops(keyframe));
     // Revisions hold no images, and must not be lost.
     const auto is_new = [](const KeyframeOutput& k) { return !k.revised; };
     if (static_cast<std::size_t>(std::count_if(queue_.begin(), queue_.end(), is_new)) >

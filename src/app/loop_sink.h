@@ -14,6 +14,9 @@
 
 namespace sovo::app {
 
+/// What loop closing needs of a keyframe: all but its points.
+KeyframeOutput needed_for_loops(const KeyframeOutput& keyframe);
+
 /// Gives the odometry's keyframes to loop closing: as they come, or, live, on a thread of the
 /// lowest priority, where the oldest of too many that wait are dropped and counted.
 class LoopSink : public OutputSink {

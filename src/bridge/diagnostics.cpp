@@ -45,6 +45,7 @@ DiagnosticReport describe(const std::string& process_name, const OdometryOutput&
       {"segment", std::to_string(output.segment)},
       {"halvings", std::to_string(output.halvings)},
       {"right_turn_deg", in_degrees(output.right_turn)},
+      {"co_moving_share", std::to_string(output.co_moving_share)},
       {"points", std::to_string(output.points)},
       {"inliers", std::to_string(output.inliers)},
       {"keyframes", std::to_string(output.keyframes)},

@@ -69,6 +69,14 @@ Keypoint in_whole_image(Keypoint keypoint, int halvings) {
   return keypoint;
 }
 
+/// Where two masks of equal size both allow pixels; an empty one allows all.
+ImageU8 both(const ImageU8& a, const ImageU8& b) {
+  if (a.empty()) return b;
+  ImageU8 out = a;
+  for (std::size_t i = 0; i < out.size(); ++i) out.data()[i] = std::min(a.data()[i], b.data()[i]);
+  return out;
+}
+
 double angle_between(const SE3& a, const SE3& b) {
   return (a.rotation().inverse() * b.rotation()).log().norm();
 }
@@ -111,7 +119,8 @@ LoopCloser::Node LoopCloser::make_node(const KeyframeOutput& keyframe) {
   place.median_depth = rho > 0.0 ? 1.0 / rho : 1.0;
   const auto& [matcher, mask] = resolution(keyframe.halvings);
   const StaticMatcher at_exposures = matcher.moved(keyframe.T_later_left);
-  for (const Keypoint& keypoint : detect_keypoints(*keyframe.left, mask, config_.keypoints)) {
+  const ImageU8 usable = keyframe.co_moving_mask ? both(mask, *keyframe.co_moving_mask) : mask;
+  for (const Keypoint& keypoint : detect_keypoints(*keyframe.left, usable, config_.keypoints)) {
     Landmark landmark{.keypoint = in_whole_image(keypoint, keyframe.halvings)};
     const StaticMatch match =
         at_exposures.match(*keyframe.left, *keyframe.right, keypoint.u, keypoint.v);

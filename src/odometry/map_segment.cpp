@@ -425,6 +425,9 @@ KeyframeOutput MapSegment::new_keyframe(const ScaleJob& job) const {
   out.right = job.right;
   out.T_later_left = job.T_later_left_turned(rig().T_right_left);
   out.halvings = halvings_;
+  if (ImageU8 mask = vo_->co_moving_mask(); !mask.empty()) {
+    out.co_moving_mask = std::make_shared<const ImageU8>(std::move(mask));
+  }
   return out;
 }
 

@@ -2,10 +2,12 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "sovo/geometry/se3.h"
+#include "sovo/image/image.h"
 #include "sovo/image/pyramid.h"
 #include "sovo/scale/scale_optimizer.h"
 
@@ -80,6 +82,7 @@ struct OdometryOutput {
   int halvings = 0;                ///< How often images are halved to be tracked.
   bool decalibrated = false;       ///< The right camera is turned against its calibration.
   Vec3 right_turn = Vec3::Zero();  ///< And by this, about its own axes, which is undone [rad].
+  double co_moving_share = 0.0;    ///< Of the image: moves along with the camera, and is left out.
   std::uint32_t points = 0;        ///< Active in the window.
   std::uint32_t inliers = 0;       ///< Pixels of the tracking reference that agree.
   std::uint32_t keyframes = 0;     ///< In the window.
@@ -121,6 +124,8 @@ struct KeyframeOutput {
   /// turn of the right camera that is undone is in it.
   SE3 T_later_left;
   int halvings = 0;  ///< How often both were halved, unlike `u` and `v`.
+  /// Of the size of `left`: 0 where what is seen moves along with the camera; null: nothing does.
+  std::shared_ptr<const ImageU8> co_moving_mask;
 };
 
 /// One run of the scale optimizer, a line of `--keyframes`.

@@ -301,6 +301,7 @@ class StereoOdometry::Impl {
     const std::lock_guard lock(map_mutex_);
     map_points_ = static_cast<std::uint32_t>(outcome.map.active_points);
     map_keyframes_ = static_cast<std::uint32_t>(outcome.map.keyframes);
+    co_moving_share_ = outcome.map.co_moving_share;
   }
 
   OdometryOutput new_output(const StereoFrame& frame) const {
@@ -324,6 +325,7 @@ class StereoOdometry::Impl {
     const std::lock_guard lock(map_mutex_);
     out->points = map_points_;
     out->keyframes = map_keyframes_;
+    out->co_moving_share = co_moving_share_;
   }
 
   /// `frame`: covariance of the frame's own alignment; `inherited`: of what it hangs on, but for
@@ -430,6 +432,7 @@ class StereoOdometry::Impl {
   mutable std::mutex map_mutex_;
   std::uint32_t map_points_ = 0;
   std::uint32_t map_keyframes_ = 0;
+  double co_moving_share_ = 0.0;
 
   // Last: its threads use what stands above.
   std::unique_ptr<LiveThreads> threads_;

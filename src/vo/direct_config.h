@@ -178,6 +178,40 @@ struct WeakTextureConfig {
   }
 };
 
+/// What moves along with the camera (its vehicle's body, dirt on the lens, a lorry ahead) is found
+/// in squares of the image, where points that are too near to stay in their place do, and left out.
+struct CoMovingConfig {
+  bool enable = true;
+  int cell = 16;              ///< Side of a square [px].
+  double min_gradient = 2.0;  ///< Of a point that has a vote [grey levels/px].
+  /// Displacement along the gradient that a point in its place should have [px].
+  double min_displacement = 2.0;
+  /// Share of the difference at its place from that where its depth puts it, below which it stays;
+  /// the other way round it has moved.
+  double better_match = 0.6;
+  /// Differences over the gradient: as much as a displacement by this brings [px].
+  double stays_below = 0.35;
+  double moves_above = 0.8;
+  double majority = 3.0;  ///< Votes that a square stays for each that it moves.
+  int keyframes = 4;      ///< In which it stayed.
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("enable", enable, "leave out what moves along with the camera");
+    v("cell", cell, "side of the squares in which that is found [px]");
+    v("min_gradient", min_gradient, "of a point that has a vote [grey levels/px]");
+    v("min_displacement", min_displacement,
+      "along its gradient, that a point which stays in place should have had [px]");
+    v("better_match", better_match,
+      "it stays when it differs there less than this x what it does where its depth puts it");
+    v("stays_below", stays_below,
+      "it stays when it changes less than by such a displacement would [px]");
+    v("moves_above", moves_above, "and has moved when it changes by more [px]");
+    v("majority", majority, "votes that a square stays for each that it moves");
+    v("keyframes", keyframes, "keyframes in which a square stayed before it is left out");
+  }
+};
+
 struct DirectConfig {
   TrackerConfig tracker;
   KeyframeConfig keyframe;
@@ -185,6 +219,7 @@ struct DirectConfig {
   PointConfig points;
   WindowConfig window;
   WeakTextureConfig weak_texture;
+  CoMovingConfig co_moving;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -194,6 +229,7 @@ struct DirectConfig {
     v("points", points, "immature points");
     v("window", window, "bundle adjustment");
     v("weak_texture", weak_texture, "thresholds on brightness of images with little texture");
+    v("co_moving", co_moving, "what moves along with the camera");
   }
 };
 

@@ -9,6 +9,7 @@
 #include "sovo/vo/marginalization.h"
 #include "sovo/vo/stage_timer.h"
 #include "sovo/vo/static_residual.h"
+#include "sovo/vo/staying_cells.h"
 #include "sovo/vo/view_forecast.h"
 
 namespace sovo {
@@ -88,6 +89,7 @@ DirectOdometry::DirectOdometry(const DirectConfig& config, const CameraModel& ca
       num_levels_(
           ImagePyramid::num_levels_for(camera.width, camera.height, config.tracker.max_levels)),
       window_(camera),
+      co_moving_(config.co_moving, camera.width, camera.height),
       selector_(selector_config(config.selection, seed)),
       activator_(config.points, config.window, pool),
       adjuster_(config.window, pool),
@@ -95,8 +97,17 @@ DirectOdometry::DirectOdometry(const DirectConfig& config, const CameraModel& ca
 
 std::vector<SelectedPixel> DirectOdometry::select_pixels(const MonoFrame& frame, int wanted) {
   std::vector<SelectedPixel> pixels;
-  selector_.select(*frame.pyramid, mask_.empty() ? nullptr : &mask_, wanted, &pixels);
+  const ImageU8 mask = usable_pixels();
+  selector_.select(*frame.pyramid, mask.empty() ? nullptr : &mask, wanted, &pixels);
   return pixels;
+}
+
+ImageU8 DirectOdometry::usable_pixels() const {
+  return co_moving_.any() ? co_moving_.mask(mask_) : mask_;
+}
+
+ImageU8 DirectOdometry::co_moving_mask() const {
+  return co_moving_.any() ? co_moving_.mask({}) : ImageU8();
 }
 
 void DirectOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
@@ -152,12 +163,18 @@ MapResult DirectOdometry::map(const TrackedFrame& tracked, const KeyframeStereo&
     const StageTimer t(timer, MapStage::kTracing);
     trace_all(found.frame, T_world_camera, tracked.affine);
   }
+  if (const auto* view = dynamic_cast<const CoMovingView*>(tracked.views.get())) {
+    co_moving_.add(view->cells);
+    leave_out_co_moving();
+    publish_reference(tracked.tracking.rmse);
+  }
   if (tracked.wants_keyframe && !stale) {
     return make_keyframe(found, T_world_camera, stereo, timer);
   }
   MapResult result;
   result.active_points = window_.num_active_points();
   result.keyframes = window_.size();
+  result.co_moving_share = co_moving_.share();
   return result;
 }
 
@@ -183,19 +200,61 @@ void DirectOdometry::trace_all(const MonoFrame& frame, const SE3& T_world_camera
   }
 }
 
+/// Lets the points of the newest keyframe vote in the frame that will be the next one.
+void DirectOdometry::find_co_moving(const TrackedFrame& tracked, const SE3& T_world_camera) {
+  if (!config_.co_moving.enable) return;
+  constexpr double kNearest = 4.0;  // mean inverse depths
+  const Keyframe& host = window_.newest();
+  const ImageF& image = tracked.frame.pyramid->level(0);
+  const HostGeometry geometry = host_geometry(
+      camera_, T_world_camera.inverse() * host.T_world_camera(),
+      brightness_transfer(host.affine, host.exposure_s, tracked.affine, tracked.frame.exposure_s));
+  co_moving_.compare(host.image(), image, tracked.tracking.rmse);
+  co_moving_.vote(image, geometry, host.immature,
+                  static_cast<float>(kNearest * window_.mean_inverse_depth()),
+                  tracked.tracking.rmse);
+  leave_out_co_moving();
+}
+
+/// What is hidden by things that move along with the camera is out of view.
+void DirectOdometry::begin_residuals_in_newest() {
+  const Keyframe& newest = window_.newest();
+  for (int h = 0; h + 1 < window_.size(); ++h) {
+    const PairGeometry& pair = window_.pair(h, window_.size() - 1);
+    for (Point& p : window_[h].points) {
+      Residual& r = p.residuals[static_cast<std::size_t>(newest.slot)];
+      r.state = ResidualState::kIn;
+      if (!co_moving_.any()) continue;
+      const Eigen::Vector3f at =
+          pair.KRKi * Eigen::Vector3f(p.u, p.v, 1.0F) + static_cast<float>(p.rho) * pair.Kt;
+      const bool hidden = at.z() > 0.0F && co_moving_.contains(at.x() / at.z(), at.y() / at.z());
+      if (hidden) r.state = ResidualState::kOutOfView;
+    }
+  }
+}
+
+/// Takes the points that move along with the camera out of the window.
+void DirectOdometry::leave_out_co_moving() {
+  if (!co_moving_.any()) return;
+  const auto moves_along = [&](const auto& p) { return co_moving_.contains(p.u, p.v); };
+  for (int h = 0; h < window_.size(); ++h) {
+    Keyframe& host = window_[h];
+    for (Point& p : host.points) p.remove = moves_along(p);
+    std::erase_if(host.immature, moves_along);
+  }
+  erase_marked_points(&window_);
+}
+
 MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& T_world_camera,
                                         const KeyframeStereo& stereo, const MapTimer& timer) {
   MapResult result;
   result.is_keyframe = true;
+  find_co_moving(tracked, T_world_camera);
   mark_leaving_keyframes(config_.keyframe, &window_);
   Keyframe& k = window_.insert(
       new_keyframe(next_id_++, tracked.frame, T_world_camera, tracked.affine, config_.window));
-  for (int h = 0; h + 1 < window_.size(); ++h) {
-    for (Point& p : window_[h].points) {
-      p.residuals[static_cast<std::size_t>(k.slot)].state = ResidualState::kIn;
-    }
-  }
   window_.update_geometry();
+  begin_residuals_in_newest();
   {
     const StageTimer t(timer, MapStage::kBundleAdjustment);
     activator_.activate(&window_);
@@ -223,6 +282,7 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
   history_.record(window_poses());
   result.active_points = window_.num_active_points();
   result.keyframes = window_.size();
+  result.co_moving_share = co_moving_.share();
   return result;
 }
 
@@ -281,7 +341,8 @@ std::vector<SelectedPixel> DirectOdometry::select_lasting_pixels() {
   const int wanted = config_.points.immature_points;
   const int more = static_cast<int>(wanted / lasting_share_);
   std::vector<SelectedPixel> pixels;
-  selector_.select(*window_.newest().pyramid, mask_.empty() ? nullptr : &mask_, more, &pixels);
+  const ImageU8 mask = usable_pixels();
+  selector_.select(*window_.newest().pyramid, mask.empty() ? nullptr : &mask, more, &pixels);
   lasting_share_ = ViewForecast(window_).keep_lasting(wanted, &pixels);
   return pixels;
 }
@@ -344,6 +405,10 @@ double DirectOdometry::share_of_thresholds(const TrackingReference& reference,
 
 void DirectOdometry::publish_reference(std::optional<double> rmse) {
   auto next = std::make_shared<TrackingReference>(build_tracking_reference(window_, num_levels_));
+  if (co_moving_.any()) {
+    *next = without(*next, co_moving_.cells(), co_moving_.found());
+    next->co_moving = co_moving_.found();
+  }
   next->log_scale = log_scale();
   next->covariance = history_.covariance();
   next->gradient_scatter = gradient_scatter_;

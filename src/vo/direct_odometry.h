@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "sovo/vo/bundle_adjustment.h"
+#include "sovo/vo/co_moving_cells.h"
 #include "sovo/vo/coarse_tracker.h"
 #include "sovo/vo/direct_config.h"
 #include "sovo/vo/keyframe_policy.h"
@@ -48,6 +49,7 @@ class DirectOdometry final : public MonocularBackend {
   std::vector<KeyframeState> window_keyframes() const override;
   const std::vector<KeyframePose>& keyframes() const override { return history_.keyframes(); }
   std::uint32_t oldest_in_window() const override { return window_[0].id; }
+  ImageU8 co_moving_mask() const override;
   int num_active_points() const override { return window_.num_active_points(); }
   double log_scale() const override { return history_.log_scale(); }
   std::shared_ptr<const ReferenceKeyframe> reference() const override {
@@ -62,6 +64,10 @@ class DirectOdometry final : public MonocularBackend {
   MapResult make_keyframe(const TrackedFrame& tracked, const SE3& T_world_camera,
                           const KeyframeStereo& stereo, const MapTimer& timer);
   std::vector<SelectedPixel> select_lasting_pixels();
+  ImageU8 usable_pixels() const;
+  void find_co_moving(const TrackedFrame& tracked, const SE3& T_world_camera);
+  void leave_out_co_moving();
+  void begin_residuals_in_newest();
   void add_immature_points(const DepthProposer& proposer, const MapTimer& timer);
   void set_right_image(const ImagePyramidPtr& right, Keyframe* keyframe);
   std::vector<KeyframeState> marginalize(const MapTimer& timer);
@@ -83,6 +89,16 @@ class DirectOdometry final : public MonocularBackend {
   /// From the likely motions, and when none fits as expected, from those of a camera that was
   /// knocked.
   TrackingResult align(const TrackingReference& reference, const MonoFrame& frame);
+  /// From the likely motions; where only a world at rest would fit so, from those of the rest,
+  /// which are then told to `map` in `views`.
+  TrackingResult align_whole_or_rest(const TrackingReference& reference, const MonoFrame& frame,
+                                     std::shared_ptr<const FrameViews>* views);
+  TrackingReference as_seen(const TrackingReference& reference, const RowShift& rows,
+                            const SE3& T_current_reference) const;
+  bool fits_as_if_at_rest(const TrackingReference& reference, const TrackingResult& tracked) const;
+  std::optional<TrackingResult> align_rest(const TrackingReference& reference,
+                                           const MonoFrame& frame, const TrackingResult& whole,
+                                           ChosenCells* co_moving);
   /// Compares a tracked frame with those before it, and notes what the next one is compared with.
   TrackedHistory compare_with_past(const TrackingReference& reference, const MonoFrame& frame,
                                    const TrackingResult& tracked);
@@ -95,6 +111,7 @@ class DirectOdometry final : public MonocularBackend {
 
   // Mapping side.
   Window window_;
+  CoMovingCells co_moving_;
   PixelSelector selector_;
   double lasting_share_ = 1.0;  ///< Of the pixels selected last, in view of the next keyframe.
   PointActivator activator_;
@@ -122,6 +139,8 @@ class DirectOdometry final : public MonocularBackend {
   double first_rmse_ = 0.0;
   std::uint32_t first_rmse_keyframe_ = 0;
   bool has_first_rmse_ = false;
+  int rest_failed_ = 0;    ///< How often in a row another motion of the rest was sought in vain,
+  int rest_waits_ = 0;     ///< and the frames until it is sought again.
   double sharpest_ = 0.0;  ///< `TrackingResult::sharpness` of the sharpest frame lately.
 };
 

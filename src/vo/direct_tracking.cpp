@@ -1,16 +1,28 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
+#include <numeric>
 
 #include "sovo/vo/direct_odometry.h"
 #include "sovo/vo/keyframe_policy.h"
 #include "sovo/vo/motion_hypotheses.h"
+#include "sovo/vo/staying_cells.h"
 
 namespace sovo {
 
 namespace {
 
 constexpr std::size_t kMotionsKept = 4;
+// When a frame fits as if the camera were at rest, but for much of it.
+constexpr double kFitsWhole = 0.9;       ///< Share of points that agree when nothing is amiss.
+constexpr double kAtRest = 1.5;          ///< RMS flow of a camera at rest [px of a VGA image].
+constexpr double kMisfits = 0.3;         ///< Share of the rest that does not agree with that,
+constexpr double kFits = 0.8;            ///< and of it that agrees with its own motion,
+constexpr double kLess = 0.5;            ///< when misfits come down to this share.
+constexpr std::size_t kLeastRest = 100;  ///< Points.
+constexpr int kOftenFailed = 4;          ///< Then frames are left out, the more the oftener,
+constexpr int kMostFailed = 8;           ///< until it is every 16th one that is looked at.
 /// Of the mean depth, of a frame of which no motion is known.
 constexpr std::array kUnknownShares = {0.02, 0.04, 0.07, 0.11, 0.16, 0.21, 0.27, 0.33, 0.4, 0.48};
 
@@ -88,6 +100,67 @@ TrackingResult DirectOdometry::align(const TrackingReference& reference, const M
   return better ? found : likely;
 }
 
+bool DirectOdometry::fits_as_if_at_rest(const TrackingReference& reference,
+                                        const TrackingResult& tracked) const {
+  if (!tracked.good || tracked.inlier_ratio > kFitsWhole) return false;
+  const PointMotion motion = motion_of_points(reference.levels[0], tracked.T_current_reference,
+                                              std::numeric_limits<double>::infinity());
+  return motion.flow_total < kAtRest * pixels_for_one_of_vga(camera_);
+}
+
+std::optional<TrackingResult> DirectOdometry::align_rest(const TrackingReference& reference,
+                                                         const MonoFrame& frame,
+                                                         const TrackingResult& whole,
+                                                         ChosenCells* co_moving) {
+  const ImageCells cells(config_.co_moving.cell, camera_.width, camera_.height);
+  const ImageF& image = frame.pyramid->level(0);
+  const BrightnessTransfer transfer =
+      brightness_transfer(reference.affine, reference.exposure_s, whole.affine, frame.exposure_s);
+  const ChosenCells staying = staying_cells(config_.co_moving, cells, reference, image, transfer);
+  TrackingReference rest = without(reference, cells, staying);
+  const std::size_t points = rest.levels[0].size();
+  if (points < kLeastRest) return {};
+  rest.mean_rho = std::reduce(rest.levels[0].rho.begin(), rest.levels[0].rho.end(), 0.0) /
+                  static_cast<double>(points);
+  const double misfits = tracker_.misfits(rest, image, whole.T_current_reference, transfer);
+  if (misfits < kMisfits) return {};
+  const auto track = [&](const TrackingReference& against, std::span<const SE3> motions) {
+    return tracker_.track(against, *frame.pyramid, frame.exposure_s, whole.affine, motions, {});
+  };
+  const TrackingResult found = track(
+      rest, tracker_.rank(rest, *frame.pyramid, frame.exposure_s, whole.affine,
+                          unknown_motions(whole.T_current_reference, rest.mean_rho, kUnknownShares),
+                          kMotionsKept));
+  if (!found.good || found.inlier_ratio < std::max(kFits, 1.0 - kLess * misfits)) return {};
+  *co_moving =
+      co_moving_cells(config_.co_moving, cells, reference, found.T_current_reference, staying);
+  if (std::ranges::count(*co_moving, 0) == std::ssize(*co_moving)) return {};
+  // What stays in its place since it is far tells of the motion, too.
+  const std::array start = {found.T_current_reference};
+  const TrackingResult out = track(without(reference, cells, *co_moving), start);
+  const bool reached = !known_motion_ || is_reachable(*known_motion_, out.T_current_reference);
+  return out.good && reached ? std::optional(out) : std::nullopt;
+}
+
+TrackingResult DirectOdometry::align_whole_or_rest(const TrackingReference& reference,
+                                                   const MonoFrame& frame,
+                                                   std::shared_ptr<const FrameViews>* views) {
+  const TrackingResult whole = align(reference, frame);
+  if (!config_.co_moving.enable || !fits_as_if_at_rest(reference, whole)) {
+    rest_failed_ = rest_waits_ = 0;
+    return whole;
+  }
+  if (--rest_waits_ > 0) return whole;
+  auto view = std::make_shared<CoMovingView>();
+  if (const auto rest = align_rest(reference, frame, whole, &view->cells)) {
+    *views = std::move(view);
+    return *rest;
+  }
+  rest_failed_ = std::min(rest_failed_ + 1, kMostFailed);
+  rest_waits_ = rest_failed_ < kOftenFailed ? 0 : 1 << (rest_failed_ - kOftenFailed);
+  return whole;
+}
+
 TrackedFrame DirectOdometry::track(const MonoFrame& frame, double max_acceleration) {
   auto ref = tracking_reference();
   motion_before_ = motion_;
@@ -128,6 +201,17 @@ TrackedHistory DirectOdometry::compare_with_past(const TrackingReference& refere
   return out;
 }
 
+/// The reference as it will be seen where a frame should be: its rows at their instants, and
+/// without what is then behind things that move along with the camera.
+TrackingReference DirectOdometry::as_seen(const TrackingReference& reference, const RowShift& rows,
+                                          const SE3& T_current_reference) const {
+  const bool rolling = !reference.rows.none() || !rows.none();
+  TrackingReference out = rolling ? moved_by_rows(reference, rows, T_current_reference) : reference;
+  if (out.co_moving.empty()) return out;
+  return without_hidden(out, ImageCells(config_.co_moving.cell, camera_.width, camera_.height),
+                        out.co_moving, T_current_reference);
+}
+
 TrackedFrame DirectOdometry::track_hypotheses(const MonoFrame& frame,
                                               std::shared_ptr<const TrackingReference> reference) {
   const TrackingReference& ref = *reference;
@@ -135,8 +219,9 @@ TrackedFrame DirectOdometry::track_hypotheses(const MonoFrame& frame,
   out.frame = frame;
   const bool rolling = !ref.rows.none() || !frame.rows.none();
   const TrackingResult tracking =
-      rolling ? align(moved_by_rows(ref, frame.rows, hypotheses_.front()), frame)
-              : align(ref, frame);
+      rolling || !ref.co_moving.empty()
+          ? align_whole_or_rest(as_seen(ref, frame.rows, hypotheses_.front()), frame, &out.views)
+          : align_whole_or_rest(ref, frame, &out.views);
   out.tracking = static_cast<const FrameTracking&>(tracking);
   out.reference = std::move(reference);
   if (!tracking.good) return out;

@@ -122,6 +122,7 @@ struct MapResult {
   BundleResult bundle;
   int active_points = 0;
   int keyframes = 0;
+  double co_moving_share = 0.0;     ///< Of the image: seen to move along with the camera.
   std::vector<KeyframeState> left;  ///< Keyframes that left the window, oldest first.
 };
 
@@ -188,6 +189,10 @@ class MonocularBackend {
 
   /// Id of the window's oldest keyframe.
   virtual std::uint32_t oldest_in_window() const = 0;
+
+  /// 0 where things are seen that move along with the camera, of the size of the tracked image;
+  /// empty when there are none.
+  virtual ImageU8 co_moving_mask() const { return {}; }
 
   virtual int num_active_points() const = 0;
   virtual double log_scale() const = 0;  ///< Sum of the similarities applied.

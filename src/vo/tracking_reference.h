@@ -5,6 +5,7 @@
 
 #include "sovo/geometry/camera_model.h"
 #include "sovo/vo/direct_config.h"
+#include "sovo/vo/image_cells.h"
 #include "sovo/vo/monocular_backend.h"
 #include "sovo/vo/window.h"
 
@@ -26,7 +27,8 @@ struct TrackingReference : ReferenceKeyframe {
   double gradient_scatter = 1.0;
   RowShift rows;  ///< Of its image.
   std::vector<ReferenceLevel> levels;
-  double threshold_share = 1.0;       ///< Of thresholds on brightness, see `WeakTextureConfig`.
+  double threshold_share = 1.0;  ///< Of thresholds on brightness, see `WeakTextureConfig`.
+  ChosenCells co_moving;  ///< Of the image: seen to move along with the camera; empty: nothing is.
   std::size_t num_window_points = 0;  ///< Points that were splatted.
 };
 

@@ -52,6 +52,31 @@ class LoopSinkTest : public ::testing::Test {
   StereoOdometry odometry_{odometry_config_, small_cameras(), &no_sink_};
 };
 
+TEST(NeededForLoops, IsAllButThePoints) {
+  KeyframeOutput k = keyframe_of(3);
+  k.segment = 2;
+  k.covariance.setIdentity();
+  k.T_later_left = SE3(SO3(), Vec3(0.01, 0.0, 0.02));
+  k.halvings = 1;
+  k.co_moving_mask = std::make_shared<const ImageU8>(80, 60);
+  k.u = k.v = k.sigma = {1.0F};
+  const KeyframeOutput needed = needed_for_loops(k);
+  EXPECT_EQ(needed.id, 3U);
+  EXPECT_EQ(needed.segment, 2U);
+  EXPECT_EQ(needed.stamp_ns, k.stamp_ns);
+  EXPECT_EQ(needed.T_odom_left.matrix(), k.T_odom_left.matrix());
+  EXPECT_EQ(needed.T_later_left.matrix(), k.T_later_left.matrix());
+  EXPECT_EQ(needed.covariance, k.covariance);
+  EXPECT_EQ(needed.inverse_depth, k.inverse_depth);
+  EXPECT_EQ(needed.left, k.left);
+  EXPECT_EQ(needed.right, k.right);
+  EXPECT_EQ(needed.halvings, 1);
+  EXPECT_EQ(needed.co_moving_mask, k.co_moving_mask);
+  EXPECT_TRUE(needed.u.empty());
+  k.revised = true;
+  EXPECT_EQ(needed_for_loops(k).left, nullptr) << "its images are known";
+}
+
 TEST_F(LoopSinkTest, AtOnceEveryKeyframeIsTakenBeforeItReturns) {
   std::size_t told = 0;
   LoopSink sink(enabled(), {}, false, [&](const LoopSink::Map& map) { told = map.places.size(); });

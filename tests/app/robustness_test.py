@@ -54,6 +54,13 @@ class Robustness(SimTest):
                                    f"sim.seed={world}", calibration=())
             self.expect_whole(truth, live, 0.02)
 
+    def test_the_vehicles_own_body_before_bare_sand(self):
+        # From rest on: what is strong moves with the cameras, and hides what it passes.
+        for body, world in (("arms", 1), ("bonnet", 2)):
+            truth, live = self.fly("sand", "--frames", 60, "--set", f"sim.own_body={body}", "--set",
+                                   f"sim.seed={world}", calibration=())
+            self.expect_whole(truth, live, 0.03)
+
     def test_the_light_changes_at_once(self):
         truth, live = self.fly("hall", "--frames", 110, light_factor=0.35, light_from_s=1.5,
                                light_until_s=3)

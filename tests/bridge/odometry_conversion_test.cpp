@@ -188,6 +188,12 @@ TEST(Diagnostics, WarnOfARightCameraThatIsTurned) {
   EXPECT_EQ(describe("", output, {}).level, Level::ERROR);
 }
 
+TEST(Diagnostics, SayHowMuchMovesAlongWithTheCamera) {
+  OdometryOutput output = test_output();
+  output.co_moving_share = 0.125;
+  EXPECT_EQ(value_of(describe("", output, {}), "co_moving_share"), "0.125000");
+}
+
 TEST(Diagnostics, SpeakOfLoopsWhereTheyAreClosed) {
   FeedStatus feed;
   EXPECT_EQ(value_of(describe("", test_output(), feed), "loops_closed"), "none");

@@ -170,6 +170,24 @@ TEST(LoopCloser, TheSecondLapTakesTheDriftAway) {
   EXPECT_LT(after, 0.5 * before) << before / 3 << " m before, " << after / 3 << " m after";
 }
 
+TEST(LoopCloser, WhatMovesAlongWithTheCameraIsNoLandmark) {
+  // All of it: nothing is recognized. The left half: the rest still is.
+  for (const int columns : {240, 120}) {
+    auto mask = std::make_shared<ImageU8>(240, 180);
+    mask->fill(255);
+    for (int y = 0; y < 180; ++y) std::fill_n(mask->row(y), columns, std::uint8_t{0});
+    DriftingOdometry odometry(1);
+    LoopCloser closer = make_closer();
+    for (int i = 0; i < 2 * kLap; ++i) {
+      KeyframeOutput keyframe = odometry.next(i);
+      keyframe.co_moving_mask = mask;
+      closer.add(keyframe);
+    }
+    EXPECT_EQ(closer.counts().places, 2U * kLap);
+    EXPECT_EQ(closer.counts().matched > 0, columns < 240) << columns;
+  }
+}
+
 TEST(LoopCloser, WithoutALoopTheTrajectoryStaysToTheBit) {
   DriftingOdometry odometry(1);
   LoopCloser closer = make_closer();

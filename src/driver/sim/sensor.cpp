@@ -55,10 +55,14 @@ void ExposureControl::observe(const std::vector<std::uint8_t>& pixels) {
   scale_by(std::pow(error, config_.exposure_speed * config_.response_gamma));
 }
 
+float light_factor(const SensorConfig& config, double since_s) {
+  const bool changed = since_s >= config.light_from_s && since_s < config.light_until_s;
+  return static_cast<float>(changed ? config.light_factor : 1.0);
+}
+
 void change_light(const SensorConfig& config, double since_s, ImageF* light) {
   constexpr float kVeilLight = 0.4F;  // about the mean of the worlds
-  const bool changed = since_s >= config.light_from_s && since_s < config.light_until_s;
-  const auto factor = static_cast<float>(changed ? config.light_factor : 1.0);
+  const float factor = light_factor(config, since_s);
   const auto veil = static_cast<float>(config.veil);
   if (veil == 0.0F && factor == 1.0F) return;
   for (std::size_t i = 0; i < light->size(); ++i) {

@@ -36,6 +36,9 @@ class ExposureControl {
   double gain_db_;
 };
 
+/// The factor on all light, `since_s` after the beginning.
+float light_factor(const SensorConfig& config, double since_s);
+
 /// What the air or the water and the lamps do to an image of light, `since_s` after the beginning.
 void change_light(const SensorConfig& config, double since_s, ImageF* light);
 

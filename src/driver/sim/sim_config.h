@@ -27,6 +27,13 @@ enum class Traffic {
   kOncoming,    ///< Cars come towards the camera.
 };
 
+/// What the cameras see of the vehicle that carries them.
+enum class Body {
+  kNone,
+  kBonnet,  ///< A car's, over the lower fifth of the image.
+  kArms,    ///< Two arms with grippers, which reach into the image from its lower corners.
+};
+
 /// Of which body a trajectory file's poses are.
 enum class TrajectoryBody {
   kAuto,    ///< Found out from the poses, see `load_motion`.
@@ -52,6 +59,9 @@ constexpr std::array<std::pair<Traffic, const char*>, 5> enum_names(Traffic) {
            {Traffic::kLorry, "lorry"},
            {Traffic::kOvertaking, "overtaking"},
            {Traffic::kOncoming, "oncoming"}}};
+}
+constexpr std::array<std::pair<Body, const char*>, 3> enum_names(Body) {
+  return {{{Body::kNone, "none"}, {Body::kBonnet, "bonnet"}, {Body::kArms, "arms"}}};
 }
 constexpr std::array<std::pair<Side, const char*>, 3> enum_names(Side) {
   return {{{Side::kNone, "none"}, {Side::kLeft, "left"}, {Side::kRight, "right"}}};
@@ -165,6 +175,7 @@ struct SimConfig {
   TrajectoryBody trajectory_body = TrajectoryBody::kAuto;
   Traffic traffic = Traffic::kNone;
   bool own_shadow = false;
+  Body own_body = Body::kNone;
   int threads = 2;
   LampConfig lamps;
   SensorConfig sensor;
@@ -190,6 +201,7 @@ struct SimConfig {
     v("traffic", traffic,
       "vehicles that move in the street: none, car or lorry ahead, overtaking or oncoming");
     v("own_shadow", own_shadow, "a rover carries the cameras, whose shadow moves with them");
+    v("own_body", own_body, "what the cameras see of their vehicle: none, bonnet or arms");
     v("threads", threads, "1 or 2: cameras rendered at once; changes no pixel");
     v("lamps", lamps, "lamps of the vehicle, which move with its cameras");
     v("sensor", sensor, "what the cameras do to the light");

@@ -63,6 +63,12 @@ Result<Motion> find_motion(const SimConfig& config, const StereoRig& rig) {
   return Error{motion.error() + "; the world's own trajectories are: " + known};
 }
 
+OwnBody own_body(const SimConfig& config, const StereoRig& rig, Side side, double haze,
+                 const RayTable& rays) {
+  if (config.own_body == Body::kNone) return {};
+  return {config.own_body, rig, side, rays, place_lamps(config.lamps, rig, side, haze)};
+}
+
 OwnShadow own_shadow(const SimConfig& config, const StereoRig& rig, Side side) {
   return config.own_shadow ? OwnShadow(rig, side) : OwnShadow();
 }
@@ -137,6 +143,8 @@ SimSource::SimSource(const SimConfig& config, Calibration calibration, Motion mo
       right_(scene_, calibration_.rig.right,
              place_lamps(config.lamps, calibration_.rig, Side::kRight, scene_.haze),
              own_shadow(config, calibration_.rig, Side::kRight)),
+      left_body_(own_body(config, calibration_.rig, Side::kLeft, scene_.haze, left_.rays())),
+      right_body_(own_body(config, calibration_.rig, Side::kRight, scene_.haze, right_.rays())),
       truth_(scene_, calibration_.rig.left),
       left_sensor_(config.sensor, calibration_.rig.left.width, calibration_.rig.left.height),
       right_sensor_(config.sensor, calibration_.rig.right.width, calibration_.rig.right.height),
@@ -214,7 +222,15 @@ SideImage SimSource::make_side(Side which, double t, std::uint64_t frame, Render
   take(renderer, which, t, &image);
   const double since = time_of(frame);
   change_light(config_.sensor, since, &image.light);
-  if (!settled_) exposure->settle(image.light);
+  const OwnBody& body = which == Side::kLeft ? left_body_ : right_body_;
+  const Vec3 to_sun = camera_at(which, t).rotation().inverse() * scene_.to_sun;
+  const OwnBody::Daylight daylight{to_sun.cast<float>(), scene_.ambient, scene_.sun,
+                                   light_factor(config_.sensor, since)};
+  if (!settled_) {
+    ImageF whole = image.light;
+    body.draw(daylight, &whole);
+    exposure->settle(whole);
+  }
   ImageF blurred;
   if (config_.sensor.motion_blur) {
     constexpr double h = 2e-3;
@@ -226,7 +242,8 @@ SideImage SimSource::make_side(Side which, double t, std::uint64_t frame, Render
                     since < config_.sensor.dark_until_s;
   const std::uint64_t seed =
       combine(combine(config_.seed, frame), which == Side::kLeft ? 101U : 202U);
-  const ImageF& light = config_.sensor.motion_blur ? blurred : image.light;
+  ImageF& light = config_.sensor.motion_blur ? blurred : image.light;
+  body.draw(daylight, &light);  // at rest before the camera: not blurred
   SideImage side;
   side.valid = true;
   side.width = light.width();
@@ -315,6 +332,7 @@ ImageF SimSource::depth_at(std::int64_t stamp_ns) {
   RenderedImage image;
   const double t = world_time(stamp_ns - shift_ns_);
   truth_.render(motion_.at(t), t, &image);
+  left_body_.cover(&image.range);
   ImageF depth(image.range.width(), image.range.height());
   for (int y = 0; y < depth.height(); ++y) {
     for (int x = 0; x < depth.width(); ++x) {
@@ -332,7 +350,7 @@ std::vector<float> SimSource::depth_at(std::int64_t stamp_ns, const std::vector<
   std::vector<float> depths;
   for (const Vec2& pixel : pixels) {
     const auto ray = calibration_.rig.left.unproject(pixel);
-    const float range = truth_.range_at(pixel);
+    const float range = left_body_.range_at(pixel).value_or(truth_.range_at(pixel));
     const bool seen = ray && std::isfinite(range);
     depths.push_back(seen ? range * static_cast<float>(ray->z()) : 0.0F);
   }

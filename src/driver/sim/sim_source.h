@@ -6,6 +6,7 @@
 
 #include "sovo/driver/dataset/frame_decoder.h"
 #include "sovo/driver/frame_source.h"
+#include "sovo/driver/sim/own_body.h"
 #include "sovo/driver/sim/sensor.h"
 #include "sovo/driver/sim/world.h"
 #include "sovo/io/calibration.h"
@@ -65,6 +66,8 @@ class SimSource : public FrameSource {
   std::vector<std::size_t> delivered_;  ///< Indices of the pairs that are not dropped.
   Renderer left_;
   Renderer right_;
+  OwnBody left_body_;
+  OwnBody right_body_;
   Renderer truth_;  ///< Of the left camera, for depth: the others belong to the decoder's thread.
   Sensor left_sensor_;
   Sensor right_sensor_;

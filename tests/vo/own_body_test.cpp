@@ -1,0 +1,141 @@
+#include <gtest/gtest.h>
+
+#include "sovo/vo/direct_odometry.h"
+#include "vo/drive_test_support.h"
+
+namespace sovo {
+namespace {
+
+using namespace test;
+
+/// A body of strong texture, 0.4 m away, over the lower part of the image.
+constexpr int kBodyEdge = 112;
+constexpr float kBodyRho = 2.5F;
+
+DirectConfig body_config() {
+  DirectConfig config;
+  config.points.active_points = 500;
+  config.points.immature_points = 400;
+  return config;
+}
+
+/// A vehicle that sees its own body before a room.
+class Vehicle {
+ public:
+  Vehicle() : pool_(1), vo_(body_config(), small_camera(), ImageU8(), 0, &pool_) {
+    const MonoFrame first = seen_from(SE3(), 0);
+    std::vector<StartPoint> points;
+    for (const SelectedPixel& pixel : vo_.select_pixels(first, 700)) {
+      points.push_back({pixel, depth_of(pixel, SE3())});
+    }
+    vo_.begin(first, SE3(), points, nullptr);
+  }
+
+  /// The next frame, from where the vehicle has come.
+  TrackedFrame track(const SE3& T_world_camera) {
+    pose_ = T_world_camera;
+    return vo_.track(seen_from(pose_, ++frame_), 0.0);
+  }
+  MapResult map(const TrackedFrame& tracked) {
+    KeyframeStereo stereo;
+    stereo.depths = [this](const auto& pixels, std::vector<DepthProposal>* proposals) {
+      for (std::size_t i = 0; i < pixels.size(); ++i) {
+        (*proposals)[i] = depth_of(pixels[i], pose_);
+      }
+    };
+    return vo_.map(tracked, stereo, nullptr);
+  }
+
+  DirectOdometry& odometry() { return vo_; }
+  MonoFrame seen_from(const SE3& T_world_camera, int index) const {
+    MonoFrame frame = frame_at(scene_, T_world_camera, index);
+    ImageF image = frame.pyramid->level(0);
+    for (int y = 0; y < image.height(); ++y) {
+      for (int x = 0; x < image.width(); ++x) {
+        if (y < kBodyEdge) continue;
+        image.at(x, y) =
+            static_cast<float>(110.0 + 40.0 * std::sin(0.5 * x) * std::cos(0.45 * y + 0.1 * x));
+      }
+    }
+    frame.pyramid = pyramid_of(std::move(image));
+    return frame;
+  }
+
+ private:
+  DepthProposal depth_of(const SelectedPixel& pixel, const SE3& pose) const {
+    const Vec2 place(pixel.x, pixel.y);
+    const auto rho = pixel.y >= kBodyEdge
+                         ? kBodyRho
+                         : static_cast<float>(1.0 / scene_.depth(small_camera(), pose, place));
+    return {rho, 0.02F * rho};
+  }
+
+  SyntheticScene scene_{3};
+  WorkerPool pool_;
+  DirectOdometry vo_;
+  SE3 pose_;
+  int frame_ = 0;
+};
+
+TEST(OwnBodyInView, IsNothingButTheBodyAndIsLeftOut) {
+  Vehicle vehicle;
+  DirectOdometry& vo = vehicle.odometry();
+  EXPECT_TRUE(vo.co_moving_mask().empty());
+  MapResult result;
+  for (int i = 1; i <= 60; ++i) {
+    const TrackedFrame tracked = vehicle.track(drive(i));
+    ASSERT_TRUE(tracked.tracking.good) << i;
+    result = vehicle.map(tracked);
+  }
+  const ImageU8 mask = vo.co_moving_mask();
+  ASSERT_EQ(mask.height(), small_camera().height);
+  int body = 0;
+  int world = 0;
+  for (int y = 0; y < mask.height(); ++y) {
+    for (int x = 0; x < mask.width(); ++x) {
+      (y < kBodyEdge ? world : body) += mask.at(x, y) == 0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(body, 0.5 * mask.width() * (mask.height() - kBodyEdge));
+  EXPECT_LT(world, 0.03 * mask.width() * kBodyEdge);
+
+  const auto left_out = [&](float u, float v) {
+    return mask.at(static_cast<int>(u), static_cast<int>(v)) == 0;
+  };
+  for (int h = 0; h < vo.window().size(); ++h) {
+    for (const Point& p : vo.window()[h].points) EXPECT_FALSE(left_out(p.u, p.v));
+    for (const ImmaturePoint& p : vo.window()[h].immature) EXPECT_FALSE(left_out(p.u, p.v));
+  }
+  const ReferenceLevel& level = vo.tracking_reference()->levels[0];
+  for (std::size_t i = 0; i < level.size(); ++i) EXPECT_FALSE(left_out(level.u[i], level.v[i]));
+  for (const SelectedPixel& p : vo.select_pixels(vehicle.seen_from(drive(61), 61), 300)) {
+    EXPECT_FALSE(left_out(p.x, p.y));
+  }
+}
+
+TEST(OwnBodyInView, WhatItHidesIsOutOfViewThere) {
+  Vehicle vehicle;
+  DirectOdometry& vo = vehicle.odometry();
+  int hidden = 0;
+  for (int i = 1; i <= 60; ++i) {
+    // It climbs: what lies before it sinks behind the body.
+    SE3 pose = drive(i);
+    pose.translation().y() = -0.02 * i;
+    if (!vehicle.map(vehicle.track(pose)).is_keyframe) continue;
+    const ImageU8 mask = vo.co_moving_mask();
+    if (mask.empty()) continue;
+    const Keyframe& newest = vo.window().newest();
+    for (int h = 0; h + 1 < vo.window().size(); ++h) {
+      for (const Point& p : vo.window()[h].points) {
+        const Residual& r = p.residuals[static_cast<std::size_t>(newest.slot)];
+        if (r.state != ResidualState::kIn) continue;
+        hidden += mask.at(static_cast<int>(r.centre_u), static_cast<int>(r.centre_v)) == 0 ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_FALSE(vo.co_moving_mask().empty());
+  EXPECT_LE(hidden, 3) << "moved there by bundle adjustment";
+}
+
+}  // namespace
+}  // namespace sovo

@@ -17,7 +17,8 @@ constexpr double kLooksDifferent = 0.5;
 constexpr float kNoise = 0.7F;        ///< Of a pattern, in RMS of what has moved as expected.
 constexpr double kBeyondNoise = 1.5;  ///< RMS of residuals of what has moved as expected.
 constexpr int kChangesToGiveUp = 3;
-constexpr int kSurrounded = 5;  ///< Of the eight cells around.
+constexpr int kSurrounded = 5;      ///< Of the eight cells around.
+constexpr double kMostShare = 0.5;  ///< Of the image; with more, poses are wrong, not the world.
 
 /// RMS difference of a pattern from what is seen at a place, but for its mean: the light that falls
 /// on what moves along changes [grey levels].
@@ -198,6 +199,13 @@ void CoMovingCells::fill_gaps() {
       filled = true;
     }
   }
+  if (share() > kMostShare) clear();
+}
+
+void CoMovingCells::clear() {
+  votes_.assign(votes_.size(), Votes());
+  found_.assign(found_.size(), 0);
+  num_found_ = 0;
 }
 
 void CoMovingCells::add(const ChosenCells& chosen) {

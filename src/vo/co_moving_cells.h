@@ -28,7 +28,7 @@ CoMovingVote co_moving_vote(const CoMovingConfig& config, const ImageF& image,
 /// The cells of an image in which things are seen that move along with the camera: the vehicle's
 /// own body, a vehicle ahead at its own speed. Points vote from keyframe to keyframe; cells in
 /// which they stay, again and again, are found. What is found and then shows other things is given
-/// up.
+/// up, and all of it when it is more than half of the image.
 class CoMovingCells {
  public:
   CoMovingCells(const CoMovingConfig& config, int width, int height);
@@ -65,6 +65,7 @@ class CoMovingCells {
   };
   void decide();
   void fill_gaps();
+  void clear();
 
   CoMovingConfig config_;
   ImageCells cells_;

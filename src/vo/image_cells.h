@@ -29,9 +29,10 @@ struct ImageCells {
   }
   /// Of a place in the image, or the nearest one [px].
   std::size_t at(float u, float v) const {
-    const int x = std::clamp(static_cast<int>(u) / side, 0, columns - 1);
-    const int y = std::clamp(static_cast<int>(v) / side, 0, rows - 1);
-    return static_cast<std::size_t>(y * columns + x);
+    const float x = std::clamp(u, 0.0F, static_cast<float>(width - 1));
+    const float y = std::clamp(v, 0.0F, static_cast<float>(height - 1));
+    const int cell = static_cast<int>(y) / side * columns + static_cast<int>(x) / side;
+    return static_cast<std::size_t>(cell);
   }
   /// Upper left pixel of a cell.
   int left(std::size_t cell) const { return static_cast<int>(cell) % columns * side; }

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "sovo/image/interpolation.h"
+
 namespace sovo {
 
 namespace {
@@ -92,6 +94,8 @@ ChosenCells staying_cells(const CoMovingConfig& config, const ImageCells& cells,
   std::vector<double> gradients(cells.size(), 0.0);
   std::vector<int> points(cells.size(), 0);
   for (std::size_t i = 0; i < level.size(); ++i) {
+    // The rows of a rolling shutter may have moved a point beyond the image.
+    if (!in_image(image, level.u[i], level.v[i], 2.0F)) continue;
     const InPlace seen = in_place(level, i, image, transfer);
     if (!(seen.gradient > config.min_gradient)) continue;
     const std::size_t cell = cells.at(level.u[i], level.v[i]);
@@ -142,7 +146,7 @@ ChosenCells co_moving_cells(const CoMovingConfig& config, const ImageCells& cell
 TrackingReference without(const TrackingReference& reference, const ImageCells& cells,
                           const ChosenCells& chosen) {
   TrackingReference out = reference;
-  float pixel = 1.0F;
+  float pixel = 1.0F;  // of the level, in pixels of the image
   for (ReferenceLevel& level : out.levels) {
     keep_if(&level, [&, &points = level](std::size_t i) {
       return chosen[cells.at(pixel * (points.u[i] + 0.5F), pixel * (points.v[i] + 0.5F))] == 0;

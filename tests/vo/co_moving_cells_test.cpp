@@ -219,6 +219,17 @@ TEST_F(CoMovingCellsTest, CellsCanBeAddedAtOnce) {
   EXPECT_NEAR(cells_.share() * static_cast<double>(chosen.size()), 1.0, 1e-9);
 }
 
+TEST_F(CoMovingCellsTest, MostOfTheImageIsNoBody) {
+  ChosenCells chosen(cells_.cells().size(), 0);
+  std::fill_n(chosen.begin(), 60, std::uint8_t{1});
+  cells_.add(chosen);
+  EXPECT_TRUE(cells_.any()) << "60 of 130";
+  std::fill_n(chosen.begin(), 70, std::uint8_t{1});
+  cells_.add(chosen);
+  EXPECT_FALSE(cells_.any());
+  EXPECT_FALSE(cells_.contains(20.0F, 20.0F));
+}
+
 TEST(ImageCellsTest, KnowThoseAround) {
   const ImageCells cells(16, 64, 64);
   ChosenCells chosen(cells.size(), 0);
@@ -243,6 +254,7 @@ TEST(ImageCellsTest, CoverTheImageRowByRow) {
   EXPECT_EQ(cells.at(39.0F, 15.9F), 2U);
   EXPECT_EQ(cells.at(39.9F, 32.9F), 8U);
   EXPECT_EQ(cells.at(-1.0F, 50.0F), 6U) << "the nearest";
+  EXPECT_EQ(cells.at(1e30F, -1e30F), 2U);
   EXPECT_EQ(cells.left(5), 32);
   EXPECT_EQ(cells.top(5), 16);
 }

@@ -61,6 +61,19 @@ TEST(StayingCellsTest, AreThoseThatLookTheSame) {
   EXPECT_LT(count(staying_cells({}, kCells, reference, image, {})), 8);
 }
 
+TEST(StayingCellsTest, PointsBeyondTheImageTellNothing) {
+  TrackingReference reference = grid(steep(0.0), 0.5F, 2.0F);
+  const ChosenCells before = staying_cells({}, kCells, reference, steep(4.0), {});
+  for (const float beyond : {-1e9F, 1.5F, 62.5F, 1e9F}) {
+    ReferenceLevel& level = reference.levels[0];
+    level.u.push_back(beyond);
+    level.v.push_back(beyond);
+    level.rho.push_back(1.0F);
+    level.colour.push_back(0.0F);
+  }
+  EXPECT_EQ(staying_cells({}, kCells, reference, steep(4.0), {}), before);
+}
+
 class CoMovingOfStaying : public ::testing::Test {
  protected:
   CoMovingOfStaying() : lower_(kCells.size(), 0) {

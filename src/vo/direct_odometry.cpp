@@ -96,14 +96,16 @@ DirectOdometry::DirectOdometry(const DirectConfig& config, const CameraModel& ca
       tracker_(config.tracker) {}
 
 std::vector<SelectedPixel> DirectOdometry::select_pixels(const MonoFrame& frame, int wanted) {
-  std::vector<SelectedPixel> pixels;
-  const ImageU8 mask = usable_pixels();
-  selector_.select(*frame.pyramid, mask.empty() ? nullptr : &mask, wanted, &pixels);
-  return pixels;
+  return select_usable(*frame.pyramid, wanted);
 }
 
-ImageU8 DirectOdometry::usable_pixels() const {
-  return co_moving_.any() ? co_moving_.mask(mask_) : mask_;
+/// Pixels that neither the mask leaves out nor what moves along with the camera.
+std::vector<SelectedPixel> DirectOdometry::select_usable(const ImagePyramid& pyramid, int wanted) {
+  const ImageU8 narrower = co_moving_.any() ? co_moving_.mask(mask_) : ImageU8();
+  const ImageU8& mask = narrower.empty() ? mask_ : narrower;
+  std::vector<SelectedPixel> pixels;
+  selector_.select(pyramid, mask.empty() ? nullptr : &mask, wanted, &pixels);
+  return pixels;
 }
 
 ImageU8 DirectOdometry::co_moving_mask() const {
@@ -340,9 +342,7 @@ std::vector<KeyframeState> DirectOdometry::window_keyframes() const {
 std::vector<SelectedPixel> DirectOdometry::select_lasting_pixels() {
   const int wanted = config_.points.immature_points;
   const int more = static_cast<int>(wanted / lasting_share_);
-  std::vector<SelectedPixel> pixels;
-  const ImageU8 mask = usable_pixels();
-  selector_.select(*window_.newest().pyramid, mask.empty() ? nullptr : &mask, more, &pixels);
+  std::vector<SelectedPixel> pixels = select_usable(*window_.newest().pyramid, more);
   lasting_share_ = ViewForecast(window_).keep_lasting(wanted, &pixels);
   return pixels;
 }

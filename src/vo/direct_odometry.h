@@ -64,7 +64,7 @@ class DirectOdometry final : public MonocularBackend {
   MapResult make_keyframe(const TrackedFrame& tracked, const SE3& T_world_camera,
                           const KeyframeStereo& stereo, const MapTimer& timer);
   std::vector<SelectedPixel> select_lasting_pixels();
-  ImageU8 usable_pixels() const;
+  std::vector<SelectedPixel> select_usable(const ImagePyramid& pyramid, int wanted);
   void find_co_moving(const TrackedFrame& tracked, const SE3& T_world_camera);
   void leave_out_co_moving();
   void begin_residuals_in_newest();

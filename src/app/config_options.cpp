@@ -127,6 +127,34 @@ Result<void> check_local_contrast(const LocalContrastConfig& c) {
   return {};
 }
 
+/// What tracking and the window could not work with.
+Result<void> check_window(const DirectConfig& vo) {
+  constexpr int kFewestPoints = 50;
+  const KeyframeConfig& keyframe = vo.keyframe;
+  if (keyframe.max_keyframes < 3 || keyframe.max_keyframes >= kMaxSlots) {
+    return Error{"vo.keyframe.max_keyframes must be 3 to " + std::to_string(kMaxSlots - 1)};
+  }
+  if (keyframe.min_keyframes < 1) return Error{"vo.keyframe.min_keyframes must be at least 1"};
+  if (vo.points.active_points < kFewestPoints || vo.points.immature_points < kFewestPoints) {
+    return Error{"vo.points.active_points and immature_points must be at least 50"};
+  }
+  if (vo.tracker.max_levels < 1) return Error{"vo.tracker.max_levels must be at least 1"};
+  if (vo.window.max_iterations < 1) return Error{"vo.window.max_iterations must be at least 1"};
+  const std::pair<const char*, double> thresholds[] = {
+      {"tracker.huber", vo.tracker.huber},
+      {"tracker.cutoff", vo.tracker.cutoff},
+      {"points.huber", vo.points.huber},
+      {"window.huber", vo.window.huber},
+      {"window.gradient_constant", vo.window.gradient_constant}};
+  for (const auto& [key, threshold] : thresholds) {
+    if (!(threshold > 0.0)) return Error{std::string("vo.") + key + " must be positive"};
+  }
+  if (!(vo.motion_blur.least_share >= 0.0 && vo.motion_blur.least_share < 1.0)) {
+    return Error{"vo.motion_blur.least_share must be at least 0 and below 1"};
+  }
+  return {};
+}
+
 Result<void> check_co_moving(const CoMovingConfig& c) {
   constexpr int kSmallestCell = 4;
   constexpr int kLargestCell = 256;
@@ -284,6 +312,7 @@ Result<void> check_config(const AppConfig& config) {
   if (auto weights = check_weights(config.odometry.vo); !weights) return weights;
   if (auto selection = check_selection(config.odometry.vo.selection); !selection) return selection;
   if (auto weak = check_weak_texture(config.odometry.vo.weak_texture); !weak) return weak;
+  if (auto window = check_window(config.odometry.vo); !window) return window;
   if (auto along = check_co_moving(config.odometry.vo.co_moving); !along) return along;
   if (auto assist = check_assist(config.odometry.assist); !assist) return assist;
   if (auto light = check_local_contrast(config.odometry.local_contrast); !light) return light;

@@ -25,6 +25,9 @@ class ExposureMotion {
   /// frame, in the unit of that frame's map. Zero while no two frames are known.
   Vec6 rate_after(double seconds) const;
 
+  /// Whether two frames are known.
+  bool known() const { return newest_.has_value(); }
+
  private:
   /// Between two frames.
   struct Step {

@@ -140,6 +140,7 @@ bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage&
   const bool at_once = right.stamp_offset_ns == 0;
   vo_->begin(frame, T_odom_left_start_, points, stereo() && at_once ? right_pyramid : nullptr);
   readout_motion_.begin(*vo_->reference());
+  exposure_motion_.note(*vo_->reference(), SE3(), frame.stamp_ns);
   // Matching errors are independent; what remains is common to all: the calibration, and where the
   // right camera went until its own exposure, as no motion is known yet.
   const double matching = 1.0 / std::sqrt(scale_information);
@@ -293,7 +294,9 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
       keyframe_stereo.right = job.right;
     }
   }
-  out.map = vo_->map(tracked, keyframe_stereo, timer);
+  TrackedFrame moving = tracked;
+  if (exposure_motion_.known()) moving.frame.velocity = exposure_motion_.rate_after(0.0);
+  out.map = vo_->map(moving, keyframe_stereo, timer);
   broken_ = out.map.failed;
   if (!out.map.is_keyframe || out.map.failed) return out;
   assist_.on_keyframe(static_cast<double>(out.map.active_points) / vo_->wanted_points(),

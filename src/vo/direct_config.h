@@ -212,6 +212,23 @@ struct CoMovingConfig {
   }
 };
 
+/// What was exposed while the camera moved is blurred. Photometric residuals between two keyframes
+/// compare a pattern as both would show it if each were blurred as the other one is, too.
+struct MotionBlurConfig {
+  bool enable = true;
+  /// Where no exposure time is given it is the one with the least residuals, if these come down
+  /// below this share of what they are without blur.
+  double least_share = 0.95;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("enable", enable, "make up for different motion blur in different keyframes");
+    v("least_share", least_share,
+      "an unknown exposure time is estimated where that brings residuals below this share of what "
+      "they are without; 0: never");
+  }
+};
+
 struct DirectConfig {
   TrackerConfig tracker;
   KeyframeConfig keyframe;
@@ -220,6 +237,7 @@ struct DirectConfig {
   WindowConfig window;
   WeakTextureConfig weak_texture;
   CoMovingConfig co_moving;
+  MotionBlurConfig motion_blur;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -230,6 +248,7 @@ struct DirectConfig {
     v("window", window, "bundle adjustment");
     v("weak_texture", weak_texture, "thresholds on brightness of images with little texture");
     v("co_moving", co_moving, "what moves along with the camera");
+    v("motion_blur", motion_blur, "motion blur that keyframes do not share");
   }
 };
 

@@ -34,6 +34,7 @@ std::unique_ptr<Keyframe> new_keyframe(std::uint32_t id, const MonoFrame& frame,
   k->exposure_s = frame.exposure_s;
   k->pyramid = frame.pyramid;
   k->rows = frame.rows;
+  k->velocity = frame.velocity;
   k->frozen_T_camera_world = T_world_camera.inverse();
   k->frozen_affine = affine;
   k->set_x(Vec8::Zero());
@@ -90,6 +91,7 @@ DirectOdometry::DirectOdometry(const DirectConfig& config, const CameraModel& ca
           ImagePyramid::num_levels_for(camera.width, camera.height, config.tracker.max_levels)),
       window_(camera),
       co_moving_(config.co_moving, camera.width, camera.height),
+      exposure_(config.motion_blur),
       selector_(selector_config(config.selection, seed)),
       activator_(config.points, config.window, pool),
       adjuster_(config.window, pool),
@@ -157,7 +159,12 @@ MapResult DirectOdometry::map(const TrackedFrame& tracked, const KeyframeStereo&
   SE3 T_camera_reference = tracked.tracking.T_current_reference;
   T_camera_reference.translation() *= std::exp(log_scale() - reference.log_scale);
   TrackedFrame found = tracked;
-  found.frame.rows.per_row *= std::exp(log_scale() - reference.log_scale);
+  const double rescaled = std::exp(log_scale() - reference.log_scale);
+  found.frame.rows.per_row *= rescaled;
+  if (!config_.motion_blur.enable) found.frame.velocity.reset();
+  if (found.frame.velocity) found.frame.velocity->head<3>() *= rescaled;
+  // How fast a map began tells its second frame.
+  if (window_.size() == 1 && !window_[0].velocity) window_[0].velocity = found.frame.velocity;
   const SE3 T_world_camera =
       keyframes()[reference.keyframe_id].T_world_camera * T_camera_reference.inverse();
   const bool stale = reference.keyframe_id != window_.newest().id;
@@ -257,6 +264,7 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
       new_keyframe(next_id_++, tracked.frame, T_world_camera, tracked.affine, config_.window));
   window_.update_geometry();
   begin_residuals_in_newest();
+  exposure_.settle(config_.window, &window_);
   {
     const StageTimer t(timer, MapStage::kBundleAdjustment);
     activator_.activate(&window_);

@@ -12,6 +12,7 @@
 #include "sovo/vo/co_moving_cells.h"
 #include "sovo/vo/coarse_tracker.h"
 #include "sovo/vo/direct_config.h"
+#include "sovo/vo/exposure_estimate.h"
 #include "sovo/vo/keyframe_policy.h"
 #include "sovo/vo/map_history.h"
 #include "sovo/vo/monocular_backend.h"
@@ -112,6 +113,7 @@ class DirectOdometry final : public MonocularBackend {
   // Mapping side.
   Window window_;
   CoMovingCells co_moving_;
+  ExposureEstimate exposure_;
   PixelSelector selector_;
   double lasting_share_ = 1.0;  ///< Of the pixels selected last, in view of the next keyframe.
   PointActivator activator_;

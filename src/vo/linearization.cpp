@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "sovo/vo/motion_blur.h"
 #include "sovo/vo/pattern_kernels.h"
 #include "sovo/vo/plain_product.h"
 
@@ -70,6 +71,82 @@ PairRowShift::Displacement row_shift(const PairGeometry& g, const Point& point,
   return g.rows.at(point.v, std::clamp(row, 0.0F, static_cast<float>(height)));
 }
 
+PatternWarp pattern_warp(const PairGeometry& g, const ImageF& image,
+                         const Eigen::Vector3f& centre) {
+  return {{centre.x(), centre.y(), centre.z()},
+          {g.KRKi(0, 0), g.KRKi(1, 0), g.KRKi(2, 0)},
+          {g.KRKi(0, 1), g.KRKi(1, 1), g.KRKi(2, 1)},
+          image.width(),
+          image.height()};
+}
+
+/// What the kernels of a pattern's sums are given.
+PatternInput pattern_input(const PatternBrightness& brightness, const Point& point,
+                           const WindowConfig& config, double huber_share, const ImageF& image,
+                           const PatternProjection& at) {
+  return {.image = &image,
+          .offset = at.offset.data(),
+          .fx = at.fx.data(),
+          .fy = at.fy.data(),
+          .colour = point.colour.data(),
+          .weight = point.weight.data(),
+          .gain = brightness.gain,
+          .bias = brightness.bias,
+          .frozen_gain = brightness.frozen_gain,
+          .frozen_host_b = brightness.frozen_host_b,
+          .huber = static_cast<float>(config.huber * huber_share),
+          .squared_gradient_constant =
+              static_cast<float>(config.gradient_constant * config.gradient_constant)};
+}
+
+void store_totals(const std::array<float, 16>& totals, LinearizedResidual* out) {
+  std::copy_n(totals.begin(), 10, out->gram.begin());
+  std::copy_n(totals.begin() + 10, 4, out->gram_r.begin());
+  out->rr = totals[14];
+  out->raw_energy = totals[15];
+}
+
+/// As `sum_pattern`, where motion blurred both images differently: each is blurred further as the
+/// other one was. False where there is nothing to do, or one would have to look beside its image.
+bool sum_blurred_pattern(const Window& window, int host, int target,
+                         const PatternBrightness& brightness, const Point& point,
+                         const WindowConfig& config, const PatternProjection& at,
+                         LinearizedResidual* out) {
+  const CameraModel& camera = window.camera();
+  const ImageF& image = window[target].image();
+  const float z = at.rho / at.centre_rho;
+  const PatternWarp warp =
+      pattern_warp(window.pair(host, target), image, {at.centre_u * z, at.centre_v * z, z});
+  const auto x = (point.u - static_cast<float>(camera.cx)) / static_cast<float>(camera.fx);
+  const auto y = (point.v - static_cast<float>(camera.cy)) / static_cast<float>(camera.fy);
+  const BlurDifference difference =
+      blur_difference(streak(camera, window[host].exposed, x, y, at.rho), pixel_warp(warp),
+                      streak(camera, window[target].exposed, at.x, at.y, at.centre_rho));
+  const Smear in_host = smear_along(difference.host);
+  const Smear in_target = smear_along(difference.target);
+  if (in_host.places == 1 && in_target.places == 1) return false;
+
+  PatternInput in = pattern_input(brightness, point, config, window[host].huber_share, image, at);
+  alignas(32) std::array<float, kPatternSize> colours;
+  if (in_host.places > 1) {
+    if (!run_kernel<SmearColours>(window[host].image(), point.u, point.v, in_host,
+                                  colours.data())) {
+      return false;
+    }
+    in.colour = colours.data();
+  }
+  alignas(32) std::array<float, 16> totals;
+  if (in_target.places > 1) {
+    SmearedPattern smeared;
+    if (!run_kernel<SmearPattern>(image, warp, in_target, &smeared)) return false;
+    run_kernel<SumSmearedPattern>(in, smeared, totals.data());
+  } else {
+    run_kernel<SumPattern>(in, totals.data());
+  }
+  store_totals(totals, out);
+  return true;
+}
+
 }  // namespace
 
 void project_pattern(const Window& window, int host, int target, const Point& point,
@@ -93,11 +170,7 @@ void project_pattern(const Window& window, int host, int target, const Point& po
   out.x = frozen.x() * out.iz;
   out.y = frozen.y() * out.iz;
 
-  const PatternWarp warp = {{centre.x(), centre.y(), centre.z()},
-                            {g.KRKi(0, 0), g.KRKi(1, 0), g.KRKi(2, 0)},
-                            {g.KRKi(0, 1), g.KRKi(1, 1), g.KRKi(2, 1)},
-                            image.width(),
-                            image.height()};
+  const PatternWarp warp = pattern_warp(g, image, centre);
   const bool inside =
       run_kernel<PlacePattern>(warp, out.fx.data(), out.fy.data(), out.offset.data());
   const float iz = 1.0F / centre.z();
@@ -122,25 +195,10 @@ void prefetch_pattern(const Window& window, int target, const PatternProjection&
 void sum_pattern(const ImageF& image, const PatternBrightness& brightness, const Point& point,
                  const WindowConfig& config, double huber_share, const PatternProjection& at,
                  LinearizedResidual* out) {
-  const PatternInput in = {.image = &image,
-                           .offset = at.offset.data(),
-                           .fx = at.fx.data(),
-                           .fy = at.fy.data(),
-                           .colour = point.colour.data(),
-                           .weight = point.weight.data(),
-                           .gain = brightness.gain,
-                           .bias = brightness.bias,
-                           .frozen_gain = brightness.frozen_gain,
-                           .frozen_host_b = brightness.frozen_host_b,
-                           .huber = static_cast<float>(config.huber * huber_share),
-                           .squared_gradient_constant = static_cast<float>(
-                               config.gradient_constant * config.gradient_constant)};
+  const PatternInput in = pattern_input(brightness, point, config, huber_share, image, at);
   alignas(32) std::array<float, 16> totals;
   run_kernel<SumPattern>(in, totals.data());
-  std::copy_n(totals.begin(), 10, out->gram.begin());
-  std::copy_n(totals.begin() + 10, 4, out->gram_r.begin());
-  out->rr = totals[14];
-  out->raw_energy = totals[15];
+  store_totals(totals, out);
 }
 
 float linearize_projected(const Window& window, const WindowConfig& config, int host, int target,
@@ -157,8 +215,12 @@ float linearize_projected(const Window& window, const WindowConfig& config, int 
     return out->energy;
   }
   geometric_jacobian(window.camera(), g, projection, out);
-  sum_pattern(target_frame.image(), {g.gain, g.bias, g.frozen_gain, g.frozen_host_b}, point, config,
-              window[host].huber_share, projection, out);
+  const PatternBrightness brightness = {g.gain, g.bias, g.frozen_gain, g.frozen_host_b};
+  if (!g.blurred ||
+      !sum_blurred_pattern(window, host, target, brightness, point, config, projection, out)) {
+    sum_pattern(target_frame.image(), brightness, point, config, window[host].huber_share,
+                projection, out);
+  }
   fill_cross(out);
   const Verdict verdict = judge(window[host], target_frame, out->raw_energy, is_textured(*out));
   out->state = verdict.state;

@@ -27,6 +27,9 @@ struct MonoFrame {
   /// a second (translation, rotation), as its images were prepared with. What it turned is undone.
   Vec6 rate = Vec6::Zero();
   RowShift rows;  ///< Where points come to lie by the way that is left.
+  /// How the camera moves at its instant, as log(T_later_earlier) a second (translation, rotation);
+  /// nothing: not known.
+  std::optional<Vec6> velocity;
 };
 
 /// First depth of a pixel, from wherever it is known.

@@ -69,31 +69,143 @@ struct PatternInput {
 };
 
 /// Weighted residuals and Gram matrix of (gx, gy, ja, jb), as many pixels at a time as F has lanes.
+struct PatternSums {
+  /// Those of pixels k on, where the image has these grey levels and gradients.
+  template <class F, class Samples>
+  SOVO_LANE_FUNCTION static void add(const PatternInput& in, std::size_t k, const Samples& s,
+                                     F* sums) {
+    const F c2 = lane_of<F>(in.squared_gradient_constant);
+    const F one = lane_of<F>(1.0F);
+    const F colour = load_lane<F>(in.colour + k);
+    const F residual = s.value - (in.gain * colour + in.bias);
+    const F gradient_squared = s.gx * s.gx + s.gy * s.gy;
+    const F w = 0.5F * (sqrt_lane(F(c2 / (c2 + gradient_squared))) + load_lane<F>(in.weight + k));
+    const F hw = min_lane(one, F(in.huber / abs_lane(residual)));
+    const F weight = sqrt_lane(hw) * w;
+    const F wr = weight * residual;
+    // d r / d (log-gain), d r / d bias of the target; the gain is the frozen one.
+    const F gx = weight * s.gx;
+    const F gy = weight * s.gy;
+    const F ja = -weight * in.frozen_gain * (colour - in.frozen_host_b);
+    const F jb = -weight;
+    const F terms[16] = {
+        gx * gx, gx * gy, gx * ja, gx * jb, gy * gy, gy * ja, gy * jb, ja * ja,
+        ja * jb, jb * jb, gx * wr, gy * wr, ja * wr, jb * wr, wr * wr, wr * wr * (2.0F - hw)};
+    for (std::size_t i = 0; i < 16; ++i) sums[i] = k == 0 ? terms[i] : sums[i] + terms[i];
+  }
+};
+
+/// The sums of a pattern as its image shows it.
 struct SumPattern {
   template <class F>
   SOVO_LANE_FUNCTION static void run(const PatternInput& in, float* totals) {
-    const F c2 = lane_of<F>(in.squared_gradient_constant);
-    const F one = lane_of<F>(1.0F);
     F sums[16];
     for (std::size_t k = 0; k < kPatternSize; k += lanes_of<F>) {
       const auto s = sample_lanes_with_gradient(*in.image, in.offset + k, load_lane<F>(in.fx + k),
                                                 load_lane<F>(in.fy + k));
-      const F colour = load_lane<F>(in.colour + k);
-      const F residual = s.value - (in.gain * colour + in.bias);
-      const F gradient_squared = s.gx * s.gx + s.gy * s.gy;
-      const F w = 0.5F * (sqrt_lane(F(c2 / (c2 + gradient_squared))) + load_lane<F>(in.weight + k));
-      const F hw = min_lane(one, F(in.huber / abs_lane(residual)));
-      const F weight = sqrt_lane(hw) * w;
-      const F wr = weight * residual;
-      // d r / d (log-gain), d r / d bias of the target; the gain is the frozen one.
-      const F gx = weight * s.gx;
-      const F gy = weight * s.gy;
-      const F ja = -weight * in.frozen_gain * (colour - in.frozen_host_b);
-      const F jb = -weight;
-      const F terms[16] = {
-          gx * gx, gx * gy, gx * ja, gx * jb, gy * gy, gy * ja, gy * jb, ja * ja,
-          ja * jb, jb * jb, gx * wr, gy * wr, ja * wr, jb * wr, wr * wr, wr * wr * (2.0F - hw)};
-      for (std::size_t i = 0; i < 16; ++i) sums[i] = k == 0 ? terms[i] : sums[i] + terms[i];
+      PatternSums::add(in, k, s, sums);
+    }
+    store_sums(sums, totals);
+    store_sums(sums + 8, totals + 8);
+  }
+};
+
+/// A line that a blurred pattern is smeared along, in the image: its length and direction [px], and
+/// at how many places the image is taken, evenly spaced and symmetric around the middle.
+struct Smear {
+  float u, v;
+  int places;
+};
+
+/// Grey levels of the pattern around (u, v), each the mean along a line; false where that leaves
+/// the image.
+struct SmearColours {
+  template <class F>
+  SOVO_LANE_FUNCTION static bool run(const ImageF& image, float u, float v, const Smear& smear,
+                                     float* colours) {
+    constexpr std::size_t n = lanes_of<F>;
+    const int w = image.width();
+    std::int32_t offset[kPatternSize];
+    F sums[kPatternSize / n] = {};
+    const float share = 1.0F / static_cast<float>(smear.places);
+    for (int i = 0; i < smear.places; ++i) {
+      const float along = (static_cast<float>(i) + 0.5F) * share - 0.5F;
+      const float x = u + along * smear.u;
+      const float y = v + along * smear.v;
+      // Written so that NaN counts as outside.
+      const bool inside = x >= 2.0F && y >= 2.0F && x < static_cast<float>(w - 3) &&
+                          y < static_cast<float>(image.height() - 3);
+      if (!inside) return false;
+      const int ix = static_cast<int>(x);
+      const int iy = static_cast<int>(y);
+      for (std::size_t k = 0; k < kPatternSize; ++k) {
+        offset[k] =
+            (iy + static_cast<int>(kPattern[k].y)) * w + ix + static_cast<int>(kPattern[k].x);
+      }
+      const F fx = lane_of<F>(x - static_cast<float>(ix));
+      const F fy = lane_of<F>(y - static_cast<float>(iy));
+      for (std::size_t k = 0; k < kPatternSize; k += n) {
+        sums[k / n] += share * blend_lanes(image.data(), w, offset + k, fx, fy);
+      }
+    }
+    for (std::size_t k = 0; k < kPatternSize; k += n) store_lane(sums[k / n], colours + k);
+    return true;
+  }
+};
+
+/// A pattern's grey levels and gradients [grey levels, grey levels / px], each the mean along a
+/// line.
+struct SmearedPattern {
+  alignas(32) std::array<float, kPatternSize> value{}, gx{}, gy{};
+};
+
+/// Takes them; false where a place lies beside the image.
+struct SmearPattern {
+  template <class F>
+  SOVO_LANE_FUNCTION static bool run(const ImageF& image, const PatternWarp& warp,
+                                     const Smear& smear, SmearedPattern* out) {
+    constexpr std::size_t n = lanes_of<F>;
+    alignas(32) float fx[kPatternSize], fy[kPatternSize];
+    std::int32_t offset[kPatternSize];
+    F value[kPatternSize / n] = {}, gx[kPatternSize / n] = {}, gy[kPatternSize / n] = {};
+    const float share = 1.0F / static_cast<float>(smear.places);
+    for (int i = 0; i < smear.places; ++i) {
+      const float along = (static_cast<float>(i) + 0.5F) * share - 0.5F;
+      PatternWarp at = warp;
+      at.centre[0] += along * smear.u * warp.centre[2];
+      at.centre[1] += along * smear.v * warp.centre[2];
+      if (!PlacePattern::run<F>(at, fx, fy, offset)) return false;
+      for (std::size_t k = 0; k < kPatternSize; k += n) {
+        const auto s = sample_lanes_with_gradient(image, offset + k, load_lane<F>(fx + k),
+                                                  load_lane<F>(fy + k));
+        value[k / n] += share * s.value;
+        gx[k / n] += share * s.gx;
+        gy[k / n] += share * s.gy;
+      }
+    }
+    for (std::size_t k = 0; k < kPatternSize; k += n) {
+      store_lane(value[k / n], &out->value[k]);
+      store_lane(gx[k / n], &out->gx[k]);
+      store_lane(gy[k / n], &out->gy[k]);
+    }
+    return true;
+  }
+};
+
+/// The sums of a pattern that was smeared; `image`, `offset`, `fx` and `fy` are not looked at.
+struct SumSmearedPattern {
+  template <class F>
+  struct Samples {
+    F value, gx, gy;
+  };
+  template <class F>
+  SOVO_LANE_FUNCTION static void run(const PatternInput& in, const SmearedPattern& smeared,
+                                     float* totals) {
+    F sums[16];
+    for (std::size_t k = 0; k < kPatternSize; k += lanes_of<F>) {
+      const Samples<F> s = {load_lane<F>(&smeared.value[k]), load_lane<F>(&smeared.gx[k]),
+                            load_lane<F>(&smeared.gy[k])};
+      PatternSums::add(in, k, s, sums);
     }
     store_sums(sums, totals);
     store_sums(sums + 8, totals + 8);

@@ -117,6 +117,31 @@ void Window::update_geometry() {
       g.adjoint_host(7, 7) = -frozen.gain;
     }
   }
+  update_blurred();
+}
+
+void Window::set_exposures(double unknown_s) {
+  constexpr double kNearest = 4.0;  // mean inverse depths
+  const double nearest = kNearest * mean_inverse_depth();
+  for (auto& k : keyframes_) {
+    k->exposed.setZero();
+    const double seconds = k->exposure_s > 0.0 ? k->exposure_s : unknown_s;
+    if (k->velocity) k->exposed = (seconds * *k->velocity).cast<float>();
+    k->longest_streak = longest_streak(camera_, k->exposed, nearest);
+  }
+  update_blurred();
+}
+
+void Window::update_blurred() {
+  for (int h = 0; h < size(); ++h) {
+    for (int t = 0; t < size(); ++t) {
+      const Keyframe& host = (*this)[h];
+      const Keyframe& target = (*this)[t];
+      const double longest = std::max(host.longest_streak, target.longest_streak);
+      pairs_[static_cast<std::size_t>(h * kMaxSlots + t)].blurred =
+          host.velocity && target.velocity && longest >= static_cast<double>(kVisibleStreak);
+    }
+  }
 }
 
 VecX Window::stacked_x() const {
@@ -163,6 +188,8 @@ void Window::apply_similarity(double scale) {
     T0.translation() = scale * T0.translation() - (1.0 - scale) * (T0.rotation() * centre);
     k->set_x(s.asDiagonal() * k->x);
     k->rows.per_row *= scale;
+    if (k->velocity) k->velocity->head<3>() *= scale;
+    k->exposed.head<3>() *= static_cast<float>(scale);
     for (Point& p : k->points) {
       p.rho /= scale;
       p.hessian *= scale * scale;

@@ -13,6 +13,7 @@
 #include "sovo/image/pyramid.h"
 #include "sovo/vo/brightness.h"
 #include "sovo/vo/immature_point.h"
+#include "sovo/vo/motion_blur.h"
 #include "sovo/vo/pattern.h"
 
 namespace sovo {
@@ -87,7 +88,10 @@ struct Keyframe {
   SE3 T_camera_world;  ///< exp(x) * frozen.
   Affine affine;       ///< frozen + x.
 
-  RowShift rows;  ///< Of a rolling shutter, in the map's unit.
+  RowShift rows;                      ///< Of a rolling shutter, in the map's unit.
+  std::optional<Vec6> velocity;       ///< MonoFrame::velocity, in the map's unit.
+  Exposed exposed = Exposed::Zero();  ///< That, while its image was exposed.
+  double longest_streak = 0.0;        ///< What that does to its image [px].
 
   double outlier_threshold = 0.0;  ///< Energy of a whole pattern.
   double huber_share = 1.0;        ///< Of its points' Huber threshold, see `WeakTextureConfig`.
@@ -125,6 +129,7 @@ struct PairGeometry {
   PairRowShift rows;      ///< By the linearization points.
   Mat8 adjoint_host;      ///< d (relative state) / d x_host; that of x_target is the identity.
   double distance = 0.0;  ///< Between the camera centres [m].
+  bool blurred = false;   ///< Motion blur is to be seen in one of both, and known of both.
 };
 
 /// The sliding window: keyframes from oldest to newest, the prior, and the geometry of each pair.
@@ -173,6 +178,10 @@ class Window {
     return pairs_[static_cast<std::size_t>(host * kMaxSlots + target)];
   }
 
+  /// Sets how the keyframes moved while their images were exposed: for as long as is known of them,
+  /// or so many seconds. Of those whose velocity is not known, blur is not known either.
+  void set_exposures(double unknown_s);
+
   /// Displacements of all keyframes, stacked (8 a keyframe).
   VecX stacked_x() const;
 
@@ -192,6 +201,7 @@ class Window {
 
  private:
   void renumber();
+  void update_blurred();
 
   CameraModel camera_;
   std::optional<StereoRig> rig_;

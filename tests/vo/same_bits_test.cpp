@@ -83,6 +83,35 @@ TEST(SameBits, LinearizationAndItsSums) {
   EXPECT_EQ(block_sum.value(), 0x47b34356d01d9278U);
 }
 
+/// The same where the keyframes' motion blurred them differently.
+TEST(SameBits, LinearizationOfBlurredKeyframes) {
+  Window window = noise_window();
+  for (int i = 0; i < window.size(); ++i) {
+    const double s = i;
+    window[i].velocity = (Vec6() << 0.0, 0.0, 0.0, 4.0 - 3.0 * s, 1.0 + 2.0 * s, 0.5).finished();
+  }
+  window.set_exposures(0.015);
+  Checksum sum;
+  int blurred = 0;
+  for (const Point& point : window[0].points) {
+    for (int target = 1; target < window.size(); ++target) {
+      LinearizedResidual sharp, r;
+      const Residual in{.state = ResidualState::kIn};
+      sum.add(linearize(window, {}, 0, target, point, in, &r));
+      sum.add(std::span(r.gram));
+      sum.add(std::span(r.gram_r));
+      const auto velocity = std::exchange(window[target].velocity, std::nullopt);
+      window.set_exposures(0.015);
+      linearize(window, {}, 0, target, point, in, &sharp);
+      blurred += r.rr != sharp.rr ? 1 : 0;
+      window[target].velocity = velocity;
+      window.set_exposures(0.015);
+    }
+  }
+  EXPECT_GT(blurred, 250);
+  EXPECT_EQ(sum.value(), 0x78d23cabb2ad2cf0U);
+}
+
 /// Pixels of an image as reference points, some of which a motion moves out of view.
 ReferenceLevel noise_level(const ImageF& image) {
   ReferenceLevel level;
@@ -156,6 +185,20 @@ TEST(SameBits, TrackerInEveryKindOfLanes) {
   EXPECT_EQ(four.value(), avx512.value());
 }
 
+/// Everything that the kernels of a smeared pattern give, in lanes of one kind; zeros beside the
+/// image.
+using Smeared = std::array<float, 16 + kPatternSize>;
+template <class Run>
+Smeared smeared(const ImageF& image, const PatternWarp& warp, const Smear& smear,
+                const PatternInput& in, const Run& run) {
+  alignas(32) Smeared out{};
+  SmearedPattern pattern;
+  const bool inside = run(SmearPattern(), image, warp, smear, &pattern);
+  if (inside) run(SumSmearedPattern(), in, pattern, out.data());
+  run(SmearColours(), image, warp.centre[0], warp.centre[1], smear, &out[16]);
+  return out;
+}
+
 TEST(SameBits, PatternsInEveryKindOfLanes) {
   if (!has_wide_lanes()) GTEST_SKIP() << "this processor has no registers of eight lanes";
   const ImageF image = noise_view(4);
@@ -194,7 +237,17 @@ TEST(SameBits, PatternsInEveryKindOfLanes) {
     run_narrow<SumPattern>(in, four.data());
     run_wide<SumPattern>(in, eight.data());
     EXPECT_EQ(four, eight);
+    const Smear smear = {draw(-6, 6), draw(-6, 6), 4};
+    const Smeared narrow = smeared(image, warp, smear, in, [](auto kernel, const auto&... args) {
+      return run_narrow<decltype(kernel)>(args...);
+    });
+    EXPECT_EQ(narrow, smeared(image, warp, smear, in, [](auto kernel, const auto&... args) {
+                return run_wide<decltype(kernel)>(args...);
+              }));
     if (!has_avx512()) continue;
+    EXPECT_EQ(narrow, smeared(image, warp, smear, in, [](auto kernel, const auto&... args) {
+                return run_avx512<decltype(kernel)>(args...);
+              }));
     eight = {};
     run_avx512<SumPattern>(in, eight.data());
     EXPECT_EQ(four, eight);

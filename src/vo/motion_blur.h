@@ -10,7 +10,7 @@
 namespace sovo {
 
 /// Streaks below this look like the bilinear interpolation that every pattern goes through [px].
-inline constexpr float kVisibleStreak = 2.0F;
+inline constexpr float kVisibleStreak = 1.0F;
 
 /// Motion of a camera during an exposure, log(T_later_earlier): translation, rotation.
 using Exposed = Eigen::Matrix<float, 6, 1>;

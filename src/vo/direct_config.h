@@ -218,7 +218,7 @@ struct MotionBlurConfig {
   bool enable = true;
   /// Where no exposure time is given it is the one with the least residuals, if these come down
   /// below this share of what they are without blur.
-  double least_share = 0.95;
+  double least_share = 0.85;
 
   template <class Visitor>
   void visit(Visitor& v) {

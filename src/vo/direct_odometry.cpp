@@ -264,9 +264,9 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
       new_keyframe(next_id_++, tracked.frame, T_world_camera, tracked.affine, config_.window));
   window_.update_geometry();
   begin_residuals_in_newest();
-  exposure_.settle(config_.window, &window_);
   {
     const StageTimer t(timer, MapStage::kBundleAdjustment);
+    exposure_.settle(config_.window, &window_);
     activator_.activate(&window_);
     window_.update_scale_held();
     result.bundle = adjuster_.optimize(&window_);

@@ -22,7 +22,7 @@ class ExposureEstimate {
   double seconds() const { return seconds_; }
 
  private:
-  /// Doubling; a half more or less is as good (docs/method.md).
+  /// Doubling: 0.6 to 1.2 times the true time is as good (docs/method.md).
   static constexpr std::array kTimes = {0.0, 0.0025, 0.005, 0.01, 0.02, 0.04};
 
   bool is_due(Window* window);

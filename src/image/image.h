@@ -2,35 +2,15 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
-#include <limits>
 #include <new>
 #include <utility>
 #include <vector>
 
+#include "sovo/image/aligned_memory.h"
+
 namespace sovo {
 
-/// Allocator of 64-byte aligned memory (a cache line, and the widest vector register).
-template <class T>
-struct AlignedAllocator {
-  using value_type = T;
-  static constexpr std::size_t kAlignment = 64;
-
-  AlignedAllocator() = default;
-  template <class U>
-  explicit AlignedAllocator(const AlignedAllocator<U>& /*other*/) {}
-
-  T* allocate(std::size_t n) {
-    return static_cast<T*>(::operator new(n * sizeof(T), std::align_val_t(kAlignment)));
-  }
-  void deallocate(T* p, std::size_t /*n*/) { ::operator delete(p, std::align_val_t(kAlignment)); }
-  bool operator==(const AlignedAllocator& /*other*/) const { return true; }
-};
-
-template <class T>
-using AlignedVector = std::vector<T, AlignedAllocator<T>>;
-
-/// The same; what a vector gains by `resize` is not set to zero: an image of a megabyte is written
+/// What a vector gains by `resize` is not set to zero: an image of a megabyte is written
 /// twice otherwise.
 template <class T>
 struct ImageAllocator : AlignedAllocator<T> {

@@ -158,26 +158,25 @@ MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver
   return out;
 }
 
-ImagePyramid FramePreparation::prepare_right(const SideImage& right, int halvings,
-                                             const Vec6& rate) const {
-  ImageF image;
-  to_float(right, cameras_.right_photometric, downscale_, &image);
-  if (right_unroller_ && !rate.isZero(0.0)) {
-    // Both cameras turn alike, each about its own axes.
-    const Vec3 turn = readout_s_ * (cameras_.rig.T_right_left.rotation() * rate.tail<3>());
-    ImageF unrolled;
-    Unroller::Lattice lattice;
-    right_unroller_->apply(image, turn, &lattice, &unrolled);
-    image = std::move(unrolled);
-  }
-  for (int h = 0; h < halvings; ++h) {
-    ImageF halved;
-    halve(image, &halved);
-    image = std::move(halved);
-  }
-  if (left_contrast_) LocalContrast(local_contrast_).apply(&image);
-  const int levels = ImagePyramid::num_levels_for(image.width(), image.height(), max_levels_);
-  return {std::move(image), levels};
+void FramePreparation::prepare_right(const SideImage& right, int halvings, const Vec6& rate,
+                                     ImagePyramid* out) const {
+  out->rebuild(max_levels_, [&](ImageF* image) {
+    to_float(right, cameras_.right_photometric, downscale_, image);
+    if (right_unroller_ && !rate.isZero(0.0)) {
+      // Both cameras turn alike, each about its own axes.
+      const Vec3 turn = readout_s_ * (cameras_.rig.T_right_left.rotation() * rate.tail<3>());
+      ImageF unrolled;
+      Unroller::Lattice lattice;
+      right_unroller_->apply(*image, turn, &lattice, &unrolled);
+      *image = std::move(unrolled);
+    }
+    for (int h = 0; h < halvings; ++h) {
+      ImageF halved;
+      halve(*image, &halved);
+      *image = std::move(halved);
+    }
+    if (left_contrast_) LocalContrast(local_contrast_).apply(image);
+  });
 }
 
 }  // namespace sovo

@@ -40,9 +40,10 @@ class FramePreparation {
   MonoFrame prepare_left(const StereoFrame& frame, StageObserver* observer, int halvings = 0,
                          const Vec6& rate = Vec6::Zero());
 
-  /// Right image ready for matching and scale optimization; `rate` as for the left one.
-  ImagePyramid prepare_right(const SideImage& right, int halvings = 0,
-                             const Vec6& rate = Vec6::Zero()) const;
+  /// Right image ready for matching and scale optimization, in the memory of what `out` was before;
+  /// `rate` as for the left one.
+  void prepare_right(const SideImage& right, int halvings, const Vec6& rate,
+                     ImagePyramid* out) const;
 
   /// Whether rows are exposed one after the other.
   bool has_rolling_shutter() const { return readout_s_ != 0.0; }

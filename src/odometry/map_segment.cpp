@@ -103,14 +103,19 @@ bool MapSegment::initialize(const MonoFrame& frame, const SideImage* right) {
   return false;
 }
 
+ImagePyramidPtr MapSegment::prepare_right(const SideImage& right, const MonoFrame& frame) {
+  auto pyramid = right_pyramids_.take();
+  preparation_.prepare_right(right, halvings_, frame.rate, pyramid.get());
+  return pyramid;
+}
+
 bool MapSegment::wants_halving() const {
   return !stereo_problem_.empty() && attempts_ > kStereoEvery;
 }
 
 bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage& right) {
   const std::vector<SelectedPixel> pixels = vo_->select_pixels(frame, vo_->wanted_points());
-  const auto right_pyramid = std::make_shared<const ImagePyramid>(
-      preparation_.prepare_right(right, halvings_, frame.rate));
+  const ImagePyramidPtr right_pyramid = prepare_right(right, frame);
   const std::vector<StaticMatch> matches =
       match_all(right_.matcher(), *frame.pyramid, *right_pyramid, pixels);
   std::vector<StartPoint> points(pixels.size());
@@ -280,8 +285,7 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
     job.T_later_left = exposure_motion_.until(right->stamp_offset_ns);
     job.turn = right_.turn();
     const auto start = std::chrono::steady_clock::now();
-    job.right = std::make_shared<const ImagePyramid>(
-        preparation_.prepare_right(*right, halvings_, tracked.frame.rate));
+    job.right = prepare_right(*right, tracked.frame);
     job.pyramid_seconds = seconds_since(start);
     // Depths of an unscaled map are no metres.
     const bool metric = filter_.locked();

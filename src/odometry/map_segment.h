@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "sovo/image/pyramid_pool.h"
 #include "sovo/odometry/exposure_motion.h"
 #include "sovo/odometry/frame_preparation.h"
 #include "sovo/odometry/odometry_output.h"
@@ -120,6 +121,8 @@ class MapSegment {
 
  private:
   TrackedFrame noted(TrackedFrame tracked);
+  /// The right image of a frame that becomes a keyframe.
+  ImagePyramidPtr prepare_right(const SideImage& right, const MonoFrame& frame);
   bool initialize_from_two_views(const MonoFrame& frame, const SideImage* right);
   bool finish_two_views(const MonoFrame& frame, const SideImage* right);
   std::vector<StaticMatch> match_all(const StaticMatcher& matcher, const ImagePyramid& left,
@@ -152,6 +155,7 @@ class MapSegment {
   StageObserver* observer_;
 
   std::unique_ptr<MonocularBackend> vo_;
+  PyramidPool right_pyramids_;
   RightCamera right_;
   ExposureMotion exposure_motion_;  ///< Of the mapping thread.
   ReadoutMotion readout_motion_;    ///< Of the tracking thread.

@@ -159,9 +159,8 @@ VecX BundleAdjuster::solve(const Window& window, const NormalEquations& system, 
   return units.cwiseProduct(y);
 }
 
-bool BundleAdjuster::apply_step(const WindowLinearization& at, const VecX& dx, double lambda,
-                                PhotometricProblem* problem, Window* window) const {
-  problem->step_depths(at, dx, lambda);
+bool BundleAdjuster::apply_step(const VecX& dx, double lambda, Window* window) {
+  problem_.step_depths(now_, dx, lambda);
   const int n = window->size();
   Vec4 sums = Vec4::Zero();  // squared: a, b, rotation, translation
   for (int i = 0; i < n; ++i) {
@@ -243,35 +242,33 @@ double BundleAdjuster::scale_information(const WindowLinearization& at,
   return information;
 }
 
-NormalEquations BundleAdjuster::iterate(PhotometricProblem* problem, Window* window,
-                                        WindowLinearization* now, BundleResult* result) const {
+NormalEquations BundleAdjuster::iterate(Window* window, BundleResult* result) {
   NormalEquations solved;
-  WindowLinearization next;
-  double energy = now->energy + prior_energy(*window);
+  double energy = now_.energy + prior_energy(*window);
   double lambda = config_.damping;
   const int max_iterations = window->size() < 4 ? 15 : config_.max_iterations;
   for (int i = 0; i < max_iterations; ++i) {
-    solved = now->system;
+    solved = now_.system;
     const VecX dx = solve(*window, solved, lambda, i >= 2);
     if (!dx.allFinite()) {
       result->finite = false;
       return solved;
     }
-    const Backup backup(*window, problem->points());
-    const bool small = apply_step(*now, dx, lambda, problem, window);
+    const Backup backup(*window, problem_.points());
+    const bool small = apply_step(dx, lambda, window);
     ++result->iterations;
     const bool converged = small && i + 1 >= config_.min_iterations;
     // Moves nothing by more than some hundredths of a pixel: not worth another linearization.
     if (converged && lambda <= config_.damping) break;
     const bool last = converged || i + 1 == max_iterations;
-    problem->linearize(*now, {.system = !last}, &next);
-    const double new_energy = next.energy + prior_energy(*window);
+    problem_.linearize(now_, {.system = !last}, &next_);
+    const double new_energy = next_.energy + prior_energy(*window);
     if (new_energy < energy) {
       energy = new_energy;
-      std::swap(*now, next);
+      std::swap(now_, next_);
       lambda = std::max(config_.damping, lambda * 0.25);
     } else {
-      backup.restore(window, problem->points());
+      backup.restore(window, problem_.points());
       lambda *= 100.0;
     }
     if (last) break;
@@ -286,38 +283,38 @@ BundleResult BundleAdjuster::optimize(Window* window) {
       refine_right_brightness(*window->rig(), config_, &(*window)[i]);
     }
   }
-  PhotometricProblem problem(config_, collect_points(window), window, pool_);
+  problem_.pose(collect_points(window), window);
   window->update_geometry();
-  const WindowLinearization known = problem.stored();
-  WindowLinearization now = known;
+  problem_.stored(&known_);
+  now_ = next_ = known_;
   const auto newest = static_cast<unsigned>(window->size() - 1);
-  problem.linearize(known, {.system = false, .statics = false, .targets = 1U << newest}, &now);
-  update_outlier_threshold(now, window);
-  problem.linearize(known, {}, &now);
+  problem_.linearize(known_, {.system = false, .statics = false, .targets = 1U << newest}, &now_);
+  update_outlier_threshold(now_, window);
+  problem_.linearize(known_, {}, &now_);
   const SE3 oldest = (*window)[0].T_world_camera();
-  const NormalEquations solved = iterate(&problem, window, &now, &result);
+  const NormalEquations solved = iterate(window, &result);
   if (!result.finite) return result;
 
   window->newest().freeze();
   // A step without gauge moves all keyframes by their share of what the newest one needs: what
   // tracking errs alike each time would drive the world along.
   window->hold_oldest(oldest);
-  update_outlier_threshold(now, window);
-  problem.reclassify(&now);
-  problem.write_back(now);
+  update_outlier_threshold(now_, window);
+  problem_.reclassify(&now_);
+  problem_.write_back(now_);
   double energy = 0.0;
-  for (const StoredResidual& r : now.residuals) {
+  for (const StoredResidual& r : now_.residuals) {
     if (r.state != ResidualState::kIn) continue;
     energy += static_cast<double>(r.energy);
     ++result.residuals;
   }
-  result.points = static_cast<int>(problem.points().size());
+  result.points = static_cast<int>(problem_.points().size());
   result.rmse = std::sqrt(energy / std::max(1, kPatternSize * result.residuals));
   result.finite = std::isfinite(result.rmse);
-  result.gradient_scatter = problem.gradient_scatter(now, static_cast<int>(newest));
+  result.gradient_scatter = problem_.gradient_scatter(now_, static_cast<int>(newest));
   result.newest_covariance =
       keyframe_variance(result.rmse, result.gradient_scatter) * newest_covariance(*window, solved);
-  if (const double information = scale_information(now, problem.points()); information > 0.0) {
+  if (const double information = scale_information(now_, problem_.points()); information > 0.0) {
     // Static residuals weigh more than their noise would have it.
     const double noise = keyframe_variance(result.rmse, result.gradient_scatter);
     result.scale_variance = config_.static_weight * noise / information;

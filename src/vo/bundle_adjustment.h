@@ -42,7 +42,8 @@ inline double frame_variance(double rmse, double gradient_scatter) {
 /// brightnesses and inverse depths; the intrinsics stay.
 class BundleAdjuster {
  public:
-  BundleAdjuster(const WindowConfig& config, WorkerPool* pool) : config_(config), pool_(pool) {}
+  BundleAdjuster(const WindowConfig& config, WorkerPool* pool)
+      : config_(config), problem_(config, pool) {}
 
   /// Optimizes, moves the newest keyframe's linearization point to its result, then drops the
   /// residuals that are outliers or out of view.
@@ -83,19 +84,19 @@ class BundleAdjuster {
   /// Sets the newest keyframe's outlier threshold from the energies of the residuals into it.
   void update_outlier_threshold(const WindowLinearization& linearized, Window* window) const;
   /// Applies the step to poses and, by back-substitution, to depths. True when all are small.
-  bool apply_step(const WindowLinearization& at, const VecX& dx, double lambda,
-                  PhotometricProblem* problem, Window* window) const;
-  /// Levenberg-Marquardt iterations from `now`, which follows the accepted estimate. Returns the
+  bool apply_step(const VecX& dx, double lambda, Window* window);
+  /// Levenberg-Marquardt iterations from `now_`, which follows the accepted estimate. Returns the
   /// last system that was solved.
-  NormalEquations iterate(PhotometricProblem* problem, Window* window, WindowLinearization* now,
-                          BundleResult* result) const;
+  NormalEquations iterate(Window* window, BundleResult* result);
   void drop_bad_residuals(Window* window) const;
   /// What static residuals that are inliers tell of a common factor of all depths.
   static double scale_information(const WindowLinearization& at,
                                   const std::vector<PointRef>& points);
 
   WindowConfig config_;
-  WorkerPool* pool_;
+  // For their memory alone: each bundle adjustment begins anew.
+  PhotometricProblem problem_;
+  WindowLinearization known_, now_, next_;
 };
 
 }  // namespace sovo

@@ -22,7 +22,7 @@ constexpr double kForget = 0.9;         ///< A keyframe: light changes, and expo
 
 /// What the newest keyframe shows decides how much of its velocity it had while it was exposed: all
 /// of it, half, or none; or it is taken for not known, and no pattern is made up for.
-void choose_velocity(const WindowConfig& config, double unknown_s, Window* window) {
+void choose_velocity(const WindowConfig& config, double unknown_s, double nearest, Window* window) {
   Keyframe& newest = window->newest();
   const std::array<std::optional<Vec6>, 4> candidates = {
       *newest.velocity, Vec6(0.5 * *newest.velocity), Vec6(Vec6::Zero()), std::nullopt};
@@ -30,7 +30,7 @@ void choose_velocity(const WindowConfig& config, double unknown_s, Window* windo
   double least = std::numeric_limits<double>::infinity();
   for (const std::optional<Vec6>& candidate : candidates) {
     newest.velocity = candidate;
-    window->set_exposures(unknown_s);
+    window->set_exposures(unknown_s, nearest);
     // The first one, which others have to beat clearly, is what the frames before tell.
     const double energy = energy_into_newest(config, *window);
     const bool is_first = least == std::numeric_limits<double>::infinity();
@@ -40,7 +40,7 @@ void choose_velocity(const WindowConfig& config, double unknown_s, Window* windo
     }
   }
   newest.velocity = best;
-  window->set_exposures(unknown_s);
+  window->set_exposures(unknown_s, nearest);
 }
 
 }  // namespace
@@ -64,18 +64,18 @@ double energy_into_newest(const WindowConfig& config, const Window& window) {
   return energy;
 }
 
-bool ExposureEstimate::is_due(Window* window) {
+bool ExposureEstimate::is_due(double nearest, Window* window) {
   const Keyframe& newest = window->newest();
   if (newest.exposure_s > 0.0 || config_.least_share <= 0.0) return false;
-  window->set_exposures(kTellingTime);
+  window->set_exposures(kTellingTime, nearest);
   if (newest.longest_streak < kTellingStreak) return false;
   ++observed_;
   return observed_ <= kObserveAlways || observed_ % kObserveSeldom == 0;
 }
 
-void ExposureEstimate::observe(const WindowConfig& config, Window* window) {
+void ExposureEstimate::observe(const WindowConfig& config, double nearest, Window* window) {
   for (std::size_t i = 0; i < kTimes.size(); ++i) {
-    window->set_exposures(kTimes[i]);
+    window->set_exposures(kTimes[i], nearest);
     energies_[i] = kForget * energies_[i] + energy_into_newest(config, *window);
   }
   const auto least = std::min_element(energies_.begin(), energies_.end());
@@ -86,10 +86,11 @@ void ExposureEstimate::observe(const WindowConfig& config, Window* window) {
 void ExposureEstimate::settle(const WindowConfig& config, Window* window) {
   Keyframe& newest = window->newest();
   if (!newest.velocity) return;
-  if (is_due(window)) observe(config, window);
-  window->set_exposures(seconds_);
+  const double nearest = window->nearest_inverse_depth();
+  if (is_due(nearest, window)) observe(config, nearest, window);
+  window->set_exposures(seconds_, nearest);
   if (newest.longest_streak >= static_cast<double>(kVisibleStreak)) {
-    choose_velocity(config, seconds_, window);
+    choose_velocity(config, seconds_, nearest, window);
   }
 }
 

@@ -25,8 +25,8 @@ class ExposureEstimate {
   /// Doubling: 0.6 to 1.2 times the true time is as good (docs/method.md).
   static constexpr std::array kTimes = {0.0, 0.0025, 0.005, 0.01, 0.02, 0.04};
 
-  bool is_due(Window* window);
-  void observe(const WindowConfig& config, Window* window);
+  bool is_due(double nearest, Window* window);
+  void observe(const WindowConfig& config, double nearest, Window* window);
 
   MotionBlurConfig config_;
   std::array<double, kTimes.size()> energies_{};

@@ -106,39 +106,48 @@ void store_totals(const std::array<float, 16>& totals, LinearizedResidual* out) 
   out->raw_energy = totals[15];
 }
 
-/// As `sum_pattern`, where motion blurred both images differently: each is blurred further as the
-/// other one was. False where there is nothing to do, or one would have to look beside its image.
-bool sum_blurred_pattern(const Window& window, int host, int target,
-                         const PatternBrightness& brightness, const Point& point,
-                         const WindowConfig& config, const PatternProjection& at,
-                         LinearizedResidual* out) {
+/// How a pattern is to be smeared in both images. Where that would take a look beside the host's
+/// image, not at all.
+PatternBlur pattern_blur(const Window& window, int host, int target, const Point& point,
+                         const PatternProjection& at, const PatternWarp& warp) {
   const CameraModel& camera = window.camera();
-  const ImageF& image = window[target].image();
-  const float z = at.rho / at.centre_rho;
-  const PatternWarp warp =
-      pattern_warp(window.pair(host, target), image, {at.centre_u * z, at.centre_v * z, z});
   const auto x = (point.u - static_cast<float>(camera.cx)) / static_cast<float>(camera.fx);
   const auto y = (point.v - static_cast<float>(camera.cy)) / static_cast<float>(camera.fy);
   const BlurDifference difference =
       blur_difference(streak(camera, window[host].exposed, x, y, at.rho), pixel_warp(warp),
                       streak(camera, window[target].exposed, at.x, at.y, at.centre_rho));
+  PatternBlur out;
+  out.known = true;
   const Smear in_host = smear_along(difference.host);
-  const Smear in_target = smear_along(difference.target);
-  if (in_host.places == 1 && in_target.places == 1) return false;
+  out.in_host = in_host.places > 1;
+  if (out.in_host && !run_kernel<SmearColours>(window[host].image(), point.u, point.v, in_host,
+                                               out.colours.data())) {
+    out.in_host = false;
+    return out;
+  }
+  out.in_target = smear_along(difference.target);
+  return out;
+}
+
+/// As `sum_pattern`, where motion blurred both images differently: each is blurred further as the
+/// other one was. False where there is nothing to do, or one would have to look beside its image.
+bool sum_blurred_pattern(const Window& window, int host, int target,
+                         const PatternBrightness& brightness, const Point& point,
+                         const WindowConfig& config, const PatternProjection& at, PatternBlur* blur,
+                         LinearizedResidual* out) {
+  const ImageF& image = window[target].image();
+  const float z = at.rho / at.centre_rho;
+  const PatternWarp warp =
+      pattern_warp(window.pair(host, target), image, {at.centre_u * z, at.centre_v * z, z});
+  if (!blur->known) *blur = pattern_blur(window, host, target, point, at, warp);
+  if (!blur->in_host && blur->in_target.places == 1) return false;
 
   PatternInput in = pattern_input(brightness, point, config, window[host].huber_share, image, at);
-  alignas(32) std::array<float, kPatternSize> colours;
-  if (in_host.places > 1) {
-    if (!run_kernel<SmearColours>(window[host].image(), point.u, point.v, in_host,
-                                  colours.data())) {
-      return false;
-    }
-    in.colour = colours.data();
-  }
+  if (blur->in_host) in.colour = blur->colours.data();
   alignas(32) std::array<float, 16> totals;
-  if (in_target.places > 1) {
+  if (blur->in_target.places > 1) {
     SmearedPattern smeared;
-    if (!run_kernel<SmearPattern>(image, warp, in_target, &smeared)) return false;
+    if (!run_kernel<SmearPattern>(image, warp, blur->in_target, &smeared)) return false;
     run_kernel<SumSmearedPattern>(in, smeared, totals.data());
   } else {
     run_kernel<SumPattern>(in, totals.data());
@@ -203,7 +212,8 @@ void sum_pattern(const ImageF& image, const PatternBrightness& brightness, const
 
 float linearize_projected(const Window& window, const WindowConfig& config, int host, int target,
                           const Point& point, const Residual& residual,
-                          const PatternProjection& projection, LinearizedResidual* out) {
+                          const PatternProjection& projection, PatternBlur* blur,
+                          LinearizedResidual* out) {
   const PairGeometry& g = window.pair(host, target);
   const Keyframe& target_frame = window[target];
   out->centre_u = projection.centre_u;
@@ -216,8 +226,8 @@ float linearize_projected(const Window& window, const WindowConfig& config, int 
   }
   geometric_jacobian(window.camera(), g, projection, out);
   const PatternBrightness brightness = {g.gain, g.bias, g.frozen_gain, g.frozen_host_b};
-  if (!g.blurred ||
-      !sum_blurred_pattern(window, host, target, brightness, point, config, projection, out)) {
+  if (!g.blurred || !sum_blurred_pattern(window, host, target, brightness, point, config,
+                                         projection, blur, out)) {
     sum_pattern(target_frame.image(), brightness, point, config, window[host].huber_share,
                 projection, out);
   }
@@ -232,7 +242,8 @@ float linearize(const Window& window, const WindowConfig& config, int host, int 
                 const Point& point, const Residual& residual, LinearizedResidual* out) {
   PatternProjection projection;
   project_pattern(window, host, target, point, &projection);
-  return linearize_projected(window, config, host, target, point, residual, projection, out);
+  PatternBlur blur;
+  return linearize_projected(window, config, host, target, point, residual, projection, &blur, out);
 }
 
 Verdict judge(const Keyframe& host, const Keyframe& target, float raw_energy, bool textured) {

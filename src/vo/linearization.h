@@ -48,10 +48,12 @@ void prefetch_pattern(const Window& window, int target, const PatternProjection&
 /// Second half: everything of the linearized residual. The image gradient, weights and pixel
 /// positions come from the current estimate, the geometric Jacobian once at the centre pixel from
 /// the frozen poses (first estimates). `residual` is what is known so far: out of view it stays,
-/// with the energy that it has. Returns the new energy.
+/// with the energy that it has. `blur` is found out where it is not known yet. Returns the new
+/// energy.
 float linearize_projected(const Window& window, const WindowConfig& config, int host, int target,
                           const Point& point, const Residual& residual,
-                          const PatternProjection& projection, LinearizedResidual* out);
+                          const PatternProjection& projection, PatternBlur* blur,
+                          LinearizedResidual* out);
 
 /// Brightness from a host to a target image, now and at the linearization point.
 struct PatternBrightness {

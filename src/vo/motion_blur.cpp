@@ -7,7 +7,7 @@ namespace sovo {
 
 namespace {
 
-constexpr float kSpacing = 1.5F;  ///< Of places along a line; pixels are interpolated [px].
+constexpr float kSpacing = 2.0F;  ///< Of places along a line; pixels are interpolated [px].
 constexpr int kMostPlaces = 12;
 
 }  // namespace

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 
 #include "sovo/geometry/camera_model.h"
 #include "sovo/geometry/types.h"
 #include "sovo/image/image.h"
+#include "sovo/vo/pattern.h"
 #include "sovo/vo/pattern_kernels.h"
 
 namespace sovo {
@@ -41,6 +43,15 @@ BlurDifference blur_difference(const Eigen::Vector2f& in_host, const Eigen::Matr
 
 /// `line` with as many places as it takes: one where it is too short to be seen.
 Smear smear_along(const Eigen::Vector2f& line);
+
+/// How a pattern is smeared in its host and in its target. Kept with a residual while that is
+/// sampled again and again: it hardly changes meanwhile.
+struct PatternBlur {
+  alignas(32) std::array<float, kPatternSize> colours{};  ///< Of the host, smeared.
+  Smear in_target{0.0F, 0.0F, 1};
+  bool known = false;
+  bool in_host = false;  ///< Whether `colours` are to be taken.
+};
 
 /// How the pixels of a pattern move: d (target pixel) / d (host pixel) at its centre.
 Eigen::Matrix2f pixel_warp(const PatternWarp& warp);

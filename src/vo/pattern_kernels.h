@@ -28,30 +28,51 @@ struct PatternWarp {
   int width, height;
 };
 
+/// Where pixels of a pattern lie, from pixel k on.
+template <class F>
+struct WarpedLanes {
+  F u, v;
+  F iz;  ///< 1 / z, of a z in which the centre's is `centre[2]`.
+  MaskOf<F> in_front;
+};
+template <class F>
+SOVO_LANE_FUNCTION WarpedLanes<F> warp_lanes(const PatternWarp& w, std::size_t k) {
+  const F dx = load_lane<F>(&kPatternOffsets.x[k]);
+  const F dy = load_lane<F>(&kPatternOffsets.y[k]);
+  const F pz = w.centre[2] + w.along_x[2] * dx + w.along_y[2] * dy;
+  const F px = w.centre[0] + w.along_x[0] * dx + w.along_y[0] * dy;
+  const F py = w.centre[1] + w.along_x[1] * dx + w.along_y[1] * dy;
+  const F iz = 1.0F / pz;
+  return {px * iz, py * iz, iz, pz > 0.0F};
+}
+
 /// Pixels and positions within them; whether all lie in the image with room for gradients.
+template <class F>
+SOVO_LANE_FUNCTION bool place_lanes(const PatternWarp& w, const F& u, const F& v, F* fx, F* fy,
+                                    std::int32_t* offset) {
+  const MaskOf<F> iu = to_int(u);
+  const MaskOf<F> iv = to_int(v);
+  *fx = u - to_float<F>(iu);
+  *fy = v - to_float<F>(iv);
+  store_mask(MaskOf<F>(iv * w.width + iu), offset);
+  // Written so that NaN counts as outside.
+  return all_of(MaskOf<F>((u > 1.1F) & (v > 1.1F) & (u < static_cast<float>(w.width - 3)) &
+                          (v < static_cast<float>(w.height - 3))));
+}
+
+/// The same of the whole pattern, which must lie in front as well.
 struct PlacePattern {
   template <class F>
   SOVO_LANE_FUNCTION static bool run(const PatternWarp& w, float* fx, float* fy,
                                      std::int32_t* offset) {
     bool inside = true;
     for (std::size_t k = 0; k < kPatternSize; k += lanes_of<F>) {
-      const F dx = load_lane<F>(&kPatternOffsets.x[k]);
-      const F dy = load_lane<F>(&kPatternOffsets.y[k]);
-      const F pz = w.centre[2] + w.along_x[2] * dx + w.along_y[2] * dy;
-      const F px = w.centre[0] + w.along_x[0] * dx + w.along_y[0] * dy;
-      const F py = w.centre[1] + w.along_x[1] * dx + w.along_y[1] * dy;
-      const F iz = 1.0F / pz;
-      const F u = px * iz;
-      const F v = py * iz;
-      // Written so that NaN counts as outside.
-      inside = inside && all_of(MaskOf<F>((pz > 0.0F) & (u > 1.1F) & (v > 1.1F) &
-                                          (u < static_cast<float>(w.width - 3)) &
-                                          (v < static_cast<float>(w.height - 3))));
-      const MaskOf<F> iu = to_int(u);
-      const MaskOf<F> iv = to_int(v);
-      store_lane(F(u - to_float<F>(iu)), fx + k);
-      store_lane(F(v - to_float<F>(iv)), fy + k);
-      store_mask(MaskOf<F>(iv * w.width + iu), offset + k);
+      const WarpedLanes<F> at = warp_lanes<F>(w, k);
+      F x, y;
+      const bool placed = place_lanes(w, at.u, at.v, &x, &y, offset + k);
+      inside = inside && placed && all_of(at.in_front);
+      store_lane(x, fx + k);
+      store_lane(y, fy + k);
     }
     return inside;
   }
@@ -126,6 +147,9 @@ struct SmearColours {
     constexpr std::size_t n = lanes_of<F>;
     const int w = image.width();
     std::int32_t offset[kPatternSize];
+    for (std::size_t k = 0; k < kPatternSize; ++k) {
+      offset[k] = static_cast<int>(kPattern[k].y) * w + static_cast<int>(kPattern[k].x);
+    }
     F sums[kPatternSize / n] = {};
     const float share = 1.0F / static_cast<float>(smear.places);
     for (int i = 0; i < smear.places; ++i) {
@@ -138,14 +162,11 @@ struct SmearColours {
       if (!inside) return false;
       const int ix = static_cast<int>(x);
       const int iy = static_cast<int>(y);
-      for (std::size_t k = 0; k < kPatternSize; ++k) {
-        offset[k] =
-            (iy + static_cast<int>(kPattern[k].y)) * w + ix + static_cast<int>(kPattern[k].x);
-      }
+      const float* middle = image.data() + static_cast<std::ptrdiff_t>(iy) * w + ix;
       const F fx = lane_of<F>(x - static_cast<float>(ix));
       const F fy = lane_of<F>(y - static_cast<float>(iy));
       for (std::size_t k = 0; k < kPatternSize; k += n) {
-        sums[k / n] += share * blend_lanes(image.data(), w, offset + k, fx, fy);
+        sums[k / n] += share * blend_lanes(middle, w, offset + k, fx, fy);
       }
     }
     for (std::size_t k = 0; k < kPatternSize; k += n) store_lane(sums[k / n], colours + k);
@@ -164,29 +185,29 @@ struct SmearPattern {
   template <class F>
   SOVO_LANE_FUNCTION static bool run(const ImageF& image, const PatternWarp& warp,
                                      const Smear& smear, SmearedPattern* out) {
-    constexpr std::size_t n = lanes_of<F>;
-    alignas(32) float fx[kPatternSize], fy[kPatternSize];
-    std::int32_t offset[kPatternSize];
-    F value[kPatternSize / n] = {}, gx[kPatternSize / n] = {}, gy[kPatternSize / n] = {};
+    std::int32_t offset[lanes_of<F>];
     const float share = 1.0F / static_cast<float>(smear.places);
-    for (int i = 0; i < smear.places; ++i) {
-      const float along = (static_cast<float>(i) + 0.5F) * share - 0.5F;
-      PatternWarp at = warp;
-      at.centre[0] += along * smear.u * warp.centre[2];
-      at.centre[1] += along * smear.v * warp.centre[2];
-      if (!PlacePattern::run<F>(at, fx, fy, offset)) return false;
-      for (std::size_t k = 0; k < kPatternSize; k += n) {
-        const auto s = sample_lanes_with_gradient(image, offset + k, load_lane<F>(fx + k),
-                                                  load_lane<F>(fy + k));
-        value[k / n] += share * s.value;
-        gx[k / n] += share * s.gx;
-        gy[k / n] += share * s.gy;
+    for (std::size_t k = 0; k < kPatternSize; k += lanes_of<F>) {
+      const WarpedLanes<F> at = warp_lanes<F>(warp, k);
+      bool inside = all_of(at.in_front);
+      const F line_u = smear.u * warp.centre[2] * at.iz;
+      const F line_v = smear.v * warp.centre[2] * at.iz;
+      F value{}, gx{}, gy{};
+      for (int i = 0; i < smear.places; ++i) {
+        const float along = (static_cast<float>(i) + 0.5F) * share - 0.5F;
+        F fx, fy;
+        inside = place_lanes(warp, F(at.u + along * line_u), F(at.v + along * line_v), &fx, &fy,
+                             offset) &&
+                 inside;
+        if (!inside) return false;
+        const auto s = sample_lanes_with_gradient(image, offset, fx, fy);
+        value += share * s.value;
+        gx += share * s.gx;
+        gy += share * s.gy;
       }
-    }
-    for (std::size_t k = 0; k < kPatternSize; k += n) {
-      store_lane(value[k / n], &out->value[k]);
-      store_lane(gx[k / n], &out->gx[k]);
-      store_lane(gy[k / n], &out->gy[k]);
+      store_lane(value, &out->value[k]);
+      store_lane(gx, &out->gx[k]);
+      store_lane(gy, &out->gy[k]);
     }
     return true;
   }

@@ -69,13 +69,14 @@ std::vector<Vec8> relative_displacements(const Window& window, const VecX& x) {
   return relative;
 }
 
-PhotometricProblem::PhotometricProblem(const WindowConfig& config, std::vector<PointRef> points,
-                                       Window* window, WorkerPool* pool)
-    : config_(config), points_(std::move(points)), window_(window), pool_(pool) {
-  first_.reserve(points_.size() + 1);
-  first_.push_back(0);
-  damping_.reserve(points_.size());
-  const double depth_damping = config.depth_damping / std::pow(window->mean_inverse_depth(), 2);
+void PhotometricProblem::pose(std::vector<PointRef> points, Window* window) {
+  points_ = std::move(points);
+  window_ = window;
+  first_.assign(1, 0);
+  damping_.clear();
+  blocks_.clear();
+  states_.clear();
+  const double depth_damping = config_.depth_damping / std::pow(window->mean_inverse_depth(), 2);
   for (std::size_t i = 0; i < points_.size(); ++i) {
     const PointRef& ref = points_[i];
     add_damping(ref, depth_damping);
@@ -91,8 +92,19 @@ PhotometricProblem::PhotometricProblem(const WindowConfig& config, std::vector<P
     blocks_.back().end = i + 1;
   }
   sums_.resize(blocks_.size());
-  sampled_.resize(first_.back());
-  if (window->rig() != nullptr) sampled_statics_.resize(points_.size());
+  forget_samples();
+}
+
+void PhotometricProblem::forget_samples() {
+  const auto forget = [](std::size_t count, AlignedVector<SampledResidual>* samples) {
+    if (samples->size() < count) samples->resize(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      (*samples)[i].linearization = -1;
+      (*samples)[i].blur.known = false;
+    }
+  };
+  forget(first_.back(), &sampled_);
+  if (window_->rig() != nullptr) forget(points_.size(), &sampled_statics_);
 }
 
 /// A pixel of parallax or less is lost in blur, and in what else moves all points of an image
@@ -111,14 +123,13 @@ void PhotometricProblem::add_damping(const PointRef& ref, double depth_damping) 
                      (unseen ? static_cast<double>(ref.point->static_information) : 0.0));
 }
 
-WindowLinearization PhotometricProblem::stored() const {
-  WindowLinearization out;
-  out.residuals.reserve(first_.back());
-  out.depths.reserve(points_.size());
-  out.statics.reserve(points_.size());
+void PhotometricProblem::stored(WindowLinearization* out) const {
+  out->residuals.clear();
+  out->depths.clear();
+  out->statics.clear();
   for (const PointRef& ref : points_) {
-    out.depths.push_back({ref.point->hessian, ref.point->gradient});
-    out.statics.push_back({.state = ref.point->static_state});
+    out->depths.push_back({ref.point->hessian, ref.point->gradient});
+    out->statics.push_back({.state = ref.point->static_state});
     for (int t = 0; t < window_->size(); ++t) {
       const Residual& r = ref.point->residuals[static_cast<std::size_t>((*window_)[t].slot)];
       if (r.state == ResidualState::kAbsent) continue;
@@ -129,10 +140,9 @@ WindowLinearization PhotometricProblem::stored() const {
       s.centre_rho = r.centre_rho;
       s.state = r.state;
       s.target = static_cast<std::uint8_t>(t);
-      out.residuals.push_back(s);
+      out->residuals.push_back(s);
     }
   }
-  return out;
 }
 
 void PhotometricProblem::remember_poses() {
@@ -235,7 +245,7 @@ const LinearizedResidual* PhotometricProblem::evaluate(const Block& block, std::
   }
   const Point& p = *points_[point].point;
   linearize_projected(*window_, config_, block.host, known.target, p, known_residual(known),
-                      step.projection, &at.linearized);
+                      step.projection, &at.blur, &at.linearized);
   at.rho = p.rho;
   const bool in_view = at.linearized.state != ResidualState::kOutOfView;
   at.linearization = in_view ? static_cast<int>(states_.size()) - 1 : -1;

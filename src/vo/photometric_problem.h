@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "sovo/image/image.h"
@@ -42,6 +43,7 @@ static_assert(sizeof(StoredResidual) == 64);
 /// A residual as it was last sampled.
 struct SampledResidual {
   LinearizedResidual linearized;
+  PatternBlur blur;
   double rho = 0.0;        ///< Inverse depth of its point then.
   int linearization = -1;  ///< Which one that was; -1: none, or out of view.
 };
@@ -86,12 +88,25 @@ struct WindowLinearization {
 /// blocks of fixed size, so that results do not depend on the number of threads.
 class PhotometricProblem {
  public:
-  /// `points` by host.
+  /// Poses nothing yet.
+  PhotometricProblem(const WindowConfig& config, WorkerPool* pool) : config_(config), pool_(pool) {}
   PhotometricProblem(const WindowConfig& config, std::vector<PointRef> points, Window* window,
-                     WorkerPool* pool);
+                     WorkerPool* pool)
+      : PhotometricProblem(config, pool) {
+    pose(std::move(points), window);
+  }
+
+  /// Begins anew with these points, by host, in the memory that there is: fresh pages cost as much
+  /// as an iteration.
+  void pose(std::vector<PointRef> points, Window* window);
 
   /// The residuals as the points have them.
-  WindowLinearization stored() const;
+  void stored(WindowLinearization* out) const;
+  WindowLinearization stored() const {
+    WindowLinearization out;
+    stored(&out);
+    return out;
+  }
 
   struct Request {
     bool system = true;  ///< Whether the normal equations of the inliers are wanted.
@@ -157,19 +172,21 @@ class PhotometricProblem {
   void linearize_block(const Block& block, const WindowLinearization& known, const Request& request,
                        WindowLinearization* out, HostSums* sums, double* energy);
 
+  void forget_samples();
+
   WindowConfig config_;
+  WorkerPool* pool_;
+  Window* window_ = nullptr;
   std::vector<PointRef> points_;
   /// Added to a point's H_rho where its depth is solved for [m^2]: without parallax a step would be
   /// noise over noise.
   std::vector<double> damping_;
-  Window* window_;
-  WorkerPool* pool_;
   std::vector<std::size_t> first_;  ///< First residual of each point, and one past the last.
   std::vector<Block> blocks_;
-  std::vector<HostSums> sums_;                    ///< Of each block.
-  std::vector<SampledResidual> sampled_;          ///< Every residual.
-  std::vector<SampledResidual> sampled_statics_;  ///< Of each point.
-  std::vector<VecX> states_;                      ///< Of the keyframes, at each linearization.
+  std::vector<HostSums> sums_;                      ///< Of each block.
+  AlignedVector<SampledResidual> sampled_;          ///< Every residual, and memory for more.
+  AlignedVector<SampledResidual> sampled_statics_;  ///< Of each point, and memory for more.
+  std::vector<VecX> states_;                        ///< Of the keyframes, at each linearization.
   /// Relative displacement of each pair since each linearization.
   std::vector<std::vector<std::array<float, 8>>> moved_;
   std::vector<Vec8> shifts_;  ///< From the frozen poses to the current ones, for `at_frozen_poses`.

@@ -132,7 +132,7 @@ std::vector<PointActivator::Candidate> PointActivator::choose(Window* window) co
 }
 
 void PointActivator::linearize(const Window& window, const Candidate& candidate, const Point& point,
-                               DepthEvaluation* out) const {
+                               CandidateBlur* blur, DepthEvaluation* out) const {
   const Residual fresh{.state = ResidualState::kIn};
   std::array<PatternProjection, kMaxSlots> projections;
   for (int t = 0; t < window.size(); ++t) {
@@ -145,7 +145,7 @@ void PointActivator::linearize(const Window& window, const Candidate& candidate,
     if (t == candidate.host) continue;
     const auto k = static_cast<std::size_t>(t);
     linearize_projected(window, window_config_, candidate.host, t, point, fresh, projections[k],
-                        &out->residuals[k]);
+                        &(*blur)[k], &out->residuals[k]);
   }
 }
 
@@ -199,8 +199,9 @@ void PointActivator::optimize(const Window& window, double mean_rho, Candidate* 
   p.rho = std::max(0.5 * (static_cast<double>(immature.rho_min) + immature.rho_max), 1e-6);
   p.static_information = immature.static_information;
 
+  CandidateBlur blur;
   DepthEvaluation now;
-  linearize(window, *candidate, p, &now);
+  linearize(window, *candidate, p, &blur, &now);
   judge(window, *candidate, 1e3, &now);
   const double unit = mean_rho * mean_rho;
   double lambda = kDepthStartLambda;
@@ -213,7 +214,7 @@ void PointActivator::optimize(const Window& window, double mean_rho, Candidate* 
   for (int it = 0; it < kIterations && now.hessian * unit >= kMinRelativeInformation; ++it) {
     const double step = now.gradient / (now.hessian * (1.0 + lambda));
     p.rho = best_rho - step;
-    linearize(window, *candidate, p, &next);
+    linearize(window, *candidate, p, &blur, &next);
     judge(window, *candidate, 1.0, &next);
     if (next.energy < now.energy) {
       best_rho = p.rho;

@@ -34,6 +34,9 @@ class OccupancyMap {
   std::vector<std::uint64_t> bits_;
 };
 
+/// How a candidate is blurred in each keyframe, by window index.
+using CandidateBlur = std::array<PatternBlur, kMaxSlots>;
+
 /// A candidate's depth measured in all keyframes.
 struct DepthEvaluation {
   std::array<LinearizedResidual, kMaxSlots> residuals;  ///< By window index; not of the host.
@@ -65,7 +68,7 @@ class PointActivator {
   void optimize(const Window& window, double mean_rho, Candidate* candidate) const;
   /// All residuals of a candidate at its present depth.
   void linearize(const Window& window, const Candidate& candidate, const Point& point,
-                 DepthEvaluation* out) const;
+                 CandidateBlur* blur, DepthEvaluation* out) const;
   /// Adds those up that are inliers with the threshold times `slack`.
   static void judge(const Window& window, const Candidate& candidate, double slack,
                     DepthEvaluation* at);

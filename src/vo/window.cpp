@@ -120,9 +120,7 @@ void Window::update_geometry() {
   update_blurred();
 }
 
-void Window::set_exposures(double unknown_s) {
-  constexpr double kNearest = 4.0;  // mean inverse depths
-  const double nearest = kNearest * mean_inverse_depth();
+void Window::set_exposures(double unknown_s, double nearest) {
   for (auto& k : keyframes_) {
     k->exposed.setZero();
     const double seconds = k->exposure_s > 0.0 ? k->exposure_s : unknown_s;

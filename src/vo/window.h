@@ -178,9 +178,14 @@ class Window {
     return pairs_[static_cast<std::size_t>(host * kMaxSlots + target)];
   }
 
+  /// Inverse depth of what counts as the nearest: four times the mean, so that a few points that
+  /// have gone astray do not matter [1/m].
+  double nearest_inverse_depth() const { return 4.0 * mean_inverse_depth(); }
   /// Sets how the keyframes moved while their images were exposed: for as long as is known of them,
-  /// or so many seconds. Of those whose velocity is not known, blur is not known either.
-  void set_exposures(double unknown_s);
+  /// or so many seconds. Of those whose velocity is not known, blur is not known either. `nearest`:
+  /// as above, for who asks often.
+  void set_exposures(double unknown_s, double nearest);
+  void set_exposures(double unknown_s) { set_exposures(unknown_s, nearest_inverse_depth()); }
 
   /// Displacements of all keyframes, stacked (8 a keyframe).
   VecX stacked_x() const;

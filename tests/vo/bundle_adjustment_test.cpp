@@ -72,6 +72,34 @@ TEST(BundleAdjustment, EnergyNeverRisesFromOneIterationToTheNext) {
   EXPECT_LT(last, 0.2 * first);
 }
 
+/// The same where motion blurred each keyframe in another way.
+Window blurred_window(double size) {
+  Window window = perturbed_window(size);
+  for (int i = 0; i < window.size(); ++i) {
+    window[i].velocity = (Vec6() << 0.1, 0.0, 0.0, 3.0 - i, 0.5 * i, 0.2).finished();
+  }
+  window.set_exposures(0.02);
+  return window;
+}
+
+/// Its memory is that of the one before, and nothing else of it.
+TEST(BundleAdjustment, RemembersNothingOfTheOneBefore) {
+  WorkerPool pool(1);
+  const auto optimized = [&](double size, BundleAdjuster* adjuster) {
+    Window window = blurred_window(size);
+    adjuster->optimize(&window);
+    return window.stacked_x();
+  };
+  BundleAdjuster used(WindowConfig(), &pool);
+  BundleAdjuster fresh(WindowConfig(), &pool);
+  Window larger = blurred_window(0.3);
+  for (int i = 0; i < larger.size(); ++i) *larger[i].velocity *= -2.0;
+  larger.set_exposures(0.02);
+  used.optimize(&larger);
+  (void)optimized(0.7, &used);
+  EXPECT_EQ(optimized(1.0, &used), optimized(1.0, &fresh));
+}
+
 TEST(BundleAdjustment, ConvergesToTheTruthUpToScale) {
   Window window = perturbed_window(1.0);
   WorkerPool pool(1);

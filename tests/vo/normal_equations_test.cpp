@@ -139,11 +139,44 @@ TEST(Linearization, ProjectionThenLinearizationIsTheWhole) {
   PatternProjection projection;
   project_pattern(window, 0, 1, point, &projection);
   prefetch_pattern(window, 1, projection);
-  linearize_projected(window, config, 0, 1, point, {.state = ResidualState::kIn}, projection,
+  PatternBlur blur;
+  linearize_projected(window, config, 0, 1, point, {.state = ResidualState::kIn}, projection, &blur,
                       &halves);
   EXPECT_EQ(halves.gram, whole.gram);
   EXPECT_EQ(halves.cross, whole.cross);
   EXPECT_EQ(halves.energy, whole.energy);
+}
+
+TEST(Linearization, TakesABlurThatIsKnown) {
+  Window window = scene_window(3, 12);
+  window[0].velocity = Vec6::Zero();
+  window[1].velocity = (Vec6() << 0.0, 0.0, 0.0, 2.0, -3.0, 0.0).finished();
+  window.set_exposures(0.02);
+  const WindowConfig config;
+  const Point& point = window[0].points[window[0].points.size() / 2];
+  PatternProjection projection;
+  project_pattern(window, 0, 1, point, &projection);
+  const auto with = [&](PatternBlur* blur) {
+    LinearizedResidual r;
+    linearize_projected(window, config, 0, 1, point, {.state = ResidualState::kIn}, projection,
+                        blur, &r);
+    return r;
+  };
+  PatternBlur blur;
+  const LinearizedResidual found = with(&blur);
+  ASSERT_TRUE(blur.known && blur.in_host);
+  EXPECT_EQ(with(&blur).gram, found.gram) << "a second time";
+  blur.colours.fill(0.0F);
+  EXPECT_NE(with(&blur).gram_r, found.gram_r) << "colours are those of the first time";
+  PatternBlur none;
+  none.known = true;
+  const LinearizedResidual without = with(&none);
+  LinearizedResidual sharp;
+  window[1].velocity.reset();
+  window.set_exposures(0.02);
+  linearize(window, config, 0, 1, point, {.state = ResidualState::kIn}, &sharp);
+  EXPECT_EQ(without.gram, sharp.gram);
+  EXPECT_NE(found.gram_r, sharp.gram_r);
 }
 
 TEST(NormalEquations, AgreeWithPlainDoublePrecision) {

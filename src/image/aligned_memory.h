@@ -18,6 +18,7 @@ struct AlignedMemory {
   static constexpr std::size_t kLine = 64;
   static constexpr std::size_t kHugePage = std::size_t{1} << 21;
 
+  /// Throws std::bad_alloc where there is none.
   static void* allocate(std::size_t bytes) {
     if (!takes_huge_pages(bytes)) return ::operator new(bytes, std::align_val_t(kLine));
     const std::size_t rounded = huge_pages(bytes) * kHugePage;
@@ -28,12 +29,15 @@ struct AlignedMemory {
 #endif
     return memory;
   }
+  /// `bytes` as it was asked for.
   static void free(void* memory, std::size_t bytes) {
     ::operator delete(memory, std::align_val_t(takes_huge_pages(bytes) ? kHugePage : kLine));
   }
+  /// How many hold so much.
   static constexpr std::size_t huge_pages(std::size_t bytes) {
     return (bytes + kHugePage - 1) / kHugePage;
   }
+  /// Whether rounding up to them adds at most half.
   static constexpr bool takes_huge_pages(std::size_t bytes) {
     constexpr std::size_t kMost = std::size_t{1} << 30;  // beyond it rounding up is no gain
     return bytes > 0 && bytes <= kMost && 2 * huge_pages(bytes) * kHugePage <= 3 * bytes;

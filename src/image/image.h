@@ -10,8 +10,8 @@
 
 namespace sovo {
 
-/// What a vector gains by `resize` is not set to zero: an image of a megabyte is written
-/// twice otherwise.
+/// What a vector gains by `resize` is not set to zero: an image of a megabyte is written twice
+/// otherwise.
 template <class T>
 struct ImageAllocator : AlignedAllocator<T> {
   ImageAllocator() = default;

@@ -171,7 +171,7 @@ class PhotometricProblem {
   StoredStatic stored_static(const Keyframe& host, const LinearizedResidual& r) const;
   void linearize_block(const Block& block, const WindowLinearization& known, const Request& request,
                        WindowLinearization* out, HostSums* sums, double* energy);
-
+  /// Every residual is sampled when it is linearized next, and its blur found out.
   void forget_samples();
 
   WindowConfig config_;

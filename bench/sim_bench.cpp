@@ -43,6 +43,7 @@ BENCHMARK_CAPTURE(render_pairs, pool, World::kPool)->Unit(benchmark::kMillisecon
 BENCHMARK_CAPTURE(render_pairs, street, World::kStreet)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(render_pairs, hall, World::kHall)->Unit(benchmark::kMillisecond);
 BENCHMARK_CAPTURE(render_pairs, sand, World::kSand)->Unit(benchmark::kMillisecond);
+BENCHMARK_CAPTURE(render_pairs, highway, World::kHighway)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace sovo::sim

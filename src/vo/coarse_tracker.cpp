@@ -34,6 +34,12 @@ constexpr double kSamePixels = 0.5;       ///< Motions that end closer on a leve
 constexpr std::size_t kMostAligned = 64;  ///< Of more, those are that explain most as they are.
 constexpr std::size_t kRankPoints = 500;  ///< Of a level: enough to compare motions, of thousands.
 
+constexpr int kFinestLevels = 2;  ///< Where a point has no neighbours that help it.
+
+int num_levels(const TrackingReference& reference, const ImagePyramid& pyramid) {
+  return std::min(static_cast<int>(reference.levels.size()), pyramid.num_levels());
+}
+
 /// A motion that moves the points out of view explains nothing.
 double badness(double rmse, int inliers, std::size_t points) {
   const double share = static_cast<double>(inliers) / static_cast<double>(points);
@@ -73,6 +79,7 @@ ReferenceLevel thinned(const ReferenceLevel& all, std::size_t most) {
     out.v.push_back(all.v[i]);
     out.rho.push_back(all.rho[i]);
     out.colour.push_back(all.colour[i]);
+    out.weight.push_back(all.weight[i]);
   }
   return out;
 }
@@ -326,11 +333,10 @@ CoarseTracker::LevelOutcome CoarseTracker::align_level(const TrackingReference& 
 
 TrackingResult CoarseTracker::try_hypothesis(const TrackingReference& reference,
                                              const ImagePyramid& pyramid, double exposure_s,
-                                             const Affine& guess, const SE3& start) {
+                                             const Affine& guess, const SE3& start, int levels) {
   TrackingResult result;
   result.T_current_reference = start;
   result.affine = guess;
-  const int levels = std::min(static_cast<int>(reference.levels.size()), pyramid.num_levels());
   const RobustNorm usual = norm_for(config_, reference);
   bool repeated = false;
   LevelOutcome outcome;
@@ -359,24 +365,47 @@ TrackingResult CoarseTracker::try_hypothesis(const TrackingReference& reference,
   return result;
 }
 
+void CoarseTracker::compare_with_last(const TrackingReference& reference,
+                                      const ImagePyramid& pyramid, const LastTracking& last,
+                                      TrackingResult* result) const {
+  compare(reference.levels[0], pyramid.level(0), result);
+  result->as_expected = is_as_expected(config_, last, *result);
+}
+
+bool CoarseTracker::is_believed(const TrackingReference& reference, const LastTracking& last,
+                                const TrackingResult& found) const {
+  return found.good && found.rmse < config_.max_rmse &&
+         found.inlier_ratio > config_.min_inlier_ratio &&
+         found.correlation > least_correlation(config_, last, found, reference.mean_rho);
+}
+
+TrackingResult CoarseTracker::refine(const TrackingReference& reference,
+                                     const ImagePyramid& pyramid, double exposure_s,
+                                     const Affine& affine_guess, const SE3& start,
+                                     const LastTracking& last) {
+  best_rmse_.assign(reference.levels.size(), 1e10);
+  const int levels = std::min(kFinestLevels, num_levels(reference, pyramid));
+  TrackingResult out = try_hypothesis(reference, pyramid, exposure_s, affine_guess, start, levels);
+  if (out.good) compare_with_last(reference, pyramid, last, &out);
+  out.good = is_believed(reference, last, out);
+  return out;
+}
+
 TrackingResult CoarseTracker::track(const TrackingReference& reference, const ImagePyramid& pyramid,
                                     double exposure_s, const Affine& affine_guess,
                                     std::span<const SE3> hypotheses, const LastTracking& last) {
   best_rmse_.assign(reference.levels.size(), 1e10);
   TrackingResult best;
   for (std::size_t i = 0; i < hypotheses.size(); ++i) {
-    TrackingResult tried =
-        try_hypothesis(reference, pyramid, exposure_s, affine_guess, hypotheses[i]);
+    TrackingResult tried = try_hypothesis(reference, pyramid, exposure_s, affine_guess,
+                                          hypotheses[i], num_levels(reference, pyramid));
     tried.hypothesis = static_cast<int>(i);
     if (!tried.good || (best.good && tried.rmse >= best.rmse)) continue;
     best = tried;
-    compare(reference.levels[0], pyramid.level(0), &best);
-    best.as_expected = is_as_expected(config_, last, best);
+    compare_with_last(reference, pyramid, last, &best);
     if (best.as_expected) break;
   }
-  if (!best.good) return best;
-  best.good = best.rmse < config_.max_rmse && best.inlier_ratio > config_.min_inlier_ratio &&
-              best.correlation > least_correlation(config_, last, best, reference.mean_rho);
+  best.good = is_believed(reference, last, best);
   return best;
 }
 
@@ -404,8 +433,7 @@ std::vector<SE3> CoarseTracker::rank(const TrackingReference& reference,
                                      const ImagePyramid& pyramid, double exposure_s,
                                      const Affine& affine_guess, std::span<const SE3> hypotheses,
                                      std::size_t keep) {
-  const int coarsest =
-      std::min(static_cast<int>(reference.levels.size()), pyramid.num_levels()) - 1;
+  const int coarsest = num_levels(reference, pyramid) - 1;
   std::vector<Ranked> ranked;
   for (const SE3& start : hypotheses) ranked.push_back({0.0, start});
   TrackingReference few = reference;

@@ -51,6 +51,12 @@ class CoarseTracker {
                        double exposure_s, const Affine& affine_guess,
                        std::span<const SE3> hypotheses, const LastTracking& last);
 
+  /// Aligns the finest levels alone, for a motion that is known to a pixel or two: where little
+  /// texture tells of it, none of that is left on coarser levels, and they lead astray.
+  TrackingResult refine(const TrackingReference& reference, const ImagePyramid& pyramid,
+                        double exposure_s, const Affine& affine_guess, const SE3& start,
+                        const LastTracking& last);
+
   /// For when nothing is known of the motion: aligns the coarsest level from each hypothesis, or of
   /// many from those that explain it best as they are, and returns the `keep` best motions found,
   /// best first.
@@ -94,8 +100,15 @@ class CoarseTracker {
                         double exposure_s, const Affine& affine, const SE3& T);
   double score_aligned(const TrackingReference& reference, int level, const ImageF& image,
                        double exposure_s, Affine affine, SE3* T);
+  /// Aligns the `levels` finest levels.
   TrackingResult try_hypothesis(const TrackingReference& reference, const ImagePyramid& pyramid,
-                                double exposure_s, const Affine& guess, const SE3& start);
+                                double exposure_s, const Affine& guess, const SE3& start,
+                                int levels);
+  /// What is as expected, and what is good enough to be believed.
+  void compare_with_last(const TrackingReference& reference, const ImagePyramid& pyramid,
+                         const LastTracking& last, TrackingResult* result) const;
+  bool is_believed(const TrackingReference& reference, const LastTracking& last,
+                   const TrackingResult& found) const;
 
   TrackerConfig config_;
   WarpedPoints warped_;

@@ -25,6 +25,9 @@ struct TrackerConfig {
   /// The same for a pose to which the motion so far led: what hides a third of the reference, as a
   /// lorry that turns does, leaves 0.5.
   double min_correlation_on_way = 0.3;
+  /// c of the weight c^2 / (c^2 + |grad I|^2) of a pixel: where the error of a place, times the
+  /// gradient, comes to outweigh noise.
+  double gradient_constant = 25.0;
   double brightness_prior_a = 100.0;  ///< Weight of a prior on the log-gain to the reference.
   double brightness_prior_b = 0.0;    ///< The same for the bias.
 
@@ -43,6 +46,8 @@ struct TrackerConfig {
     v("min_correlation", min_correlation, "tracking is lost below");
     v("min_correlation_on_way", min_correlation_on_way,
       "the same for a pose to which the motion so far led");
+    v("gradient_constant", gradient_constant,
+      "c of a pixel's weight c^2 / (c^2 + |grad|^2) [grey levels/px]");
     v("brightness_prior_a", brightness_prior_a, "weight of the prior on the log-gain");
     v("brightness_prior_b", brightness_prior_b, "weight of the prior on the bias");
   }

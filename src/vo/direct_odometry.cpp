@@ -51,6 +51,13 @@ double known_sigma(const Point& p, double rho_unit) {
   return sigma > kMaxRelativeSigma * p.rho ? 0.0 : sigma;
 }
 
+/// And the points that stereo found in the newest keyframe.
+std::vector<SeenPoint> with_matched(std::vector<SeenPoint> seen, const Window& window) {
+  const std::vector<SeenPoint> matched = matched_points(window);
+  seen.insert(seen.end(), matched.begin(), matched.end());
+  return seen;
+}
+
 /// The same as `Point::hessian` that a match's deviation stands for.
 double information_of(const DepthProposal& depth) {
   return std::pow(kPixelNoise / std::max(depth.sigma, 1e-6F), 2);
@@ -149,7 +156,7 @@ void DirectOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
   }
   window_.update_geometry();
   history_.record(window_poses());
-  publish_reference(std::nullopt);
+  publish_reference(active_points(window_), std::nullopt);
 }
 
 MapResult DirectOdometry::map(const TrackedFrame& tracked, const KeyframeStereo& stereo,
@@ -175,7 +182,7 @@ MapResult DirectOdometry::map(const TrackedFrame& tracked, const KeyframeStereo&
   if (const auto* view = dynamic_cast<const CoMovingView*>(tracked.views.get())) {
     co_moving_.add(view->cells);
     leave_out_co_moving();
-    publish_reference(tracked.tracking.rmse);
+    publish_reference(with_matched(active_points(window_), window_), tracked.tracking.rmse);
   }
   if (tracked.wants_keyframe && !stale) {
     return make_keyframe(found, T_world_camera, stereo, timer);
@@ -283,10 +290,12 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
     }
   }
   erase_marked_points(&window_);
-  publish_reference(tracked.tracking.rmse);
+  // Before points leave, which the frames until the next keyframe see.
+  std::vector<SeenPoint> seen = active_points(window_);
   take_snapshot();
   result.left = marginalize(timer);
   add_immature_points(stereo.depths, timer);
+  publish_reference(with_matched(std::move(seen), window_), tracked.tracking.rmse);
   window_.newest().T_later_left = stereo.T_later_left;
   set_right_image(stereo.right, &window_.newest());
   history_.record(window_poses());
@@ -411,8 +420,10 @@ double DirectOdometry::share_of_thresholds(const TrackingReference& reference,
                          config_.tracker.cutoff, rmse.value_or(0.0));
 }
 
-void DirectOdometry::publish_reference(std::optional<double> rmse) {
-  auto next = std::make_shared<TrackingReference>(build_tracking_reference(window_, num_levels_));
+void DirectOdometry::publish_reference(std::span<const SeenPoint> points,
+                                       std::optional<double> rmse) {
+  auto next = std::make_shared<TrackingReference>(
+      build_tracking_reference(window_, points, num_levels_, config_.tracker.gradient_constant));
   if (co_moving_.any()) {
     *next = without(*next, co_moving_.cells(), co_moving_.found());
     next->co_moving = co_moving_.found();

@@ -75,7 +75,7 @@ class DirectOdometry final : public MonocularBackend {
   void keep_point(const Point& point, double rho_unit, KeyframePoints* points) const;
   KeyframeState state_without_active_points(const Keyframe& keyframe) const;
   /// `rmse`: of the last frame that was tracked; nothing at a map's beginning.
-  void publish_reference(std::optional<double> rmse);
+  void publish_reference(std::span<const SeenPoint> points, std::optional<double> rmse);
   double share_of_thresholds(const TrackingReference& reference, std::optional<double> rmse) const;
   std::vector<WindowPose> window_poses() const;
   void take_snapshot();
@@ -87,6 +87,10 @@ class DirectOdometry final : public MonocularBackend {
   TrackingResult track_from_any(const TrackingReference& reference, const MonoFrame& frame,
                                 std::span<const SE3> hypotheses,
                                 const std::optional<SE3>& expected);
+  /// From the likely motions, and where that leads elsewhere than the motion did, from there on the
+  /// finest levels alone.
+  TrackingResult track_likely(const TrackingReference& reference, const MonoFrame& frame,
+                              const KnownMotion& known);
   /// From the likely motions, and when none fits as expected, from those of a camera that was
   /// knocked.
   TrackingResult align(const TrackingReference& reference, const MonoFrame& frame);

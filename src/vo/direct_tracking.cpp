@@ -45,6 +45,15 @@ std::vector<SE3> knocked_motions(const KnownMotion& known, const CameraModel& le
   return out;
 }
 
+/// Whether two motions differ by a pixel or so.
+bool is_nearly(const SE3& a, const SE3& b, double mean_rho) {
+  constexpr double kTurn = 0.005;   // [rad]
+  constexpr double kShift = 0.005;  // mean depths
+  const SE3 difference = a * b.inverse();
+  return difference.rotation().log().norm() < kTurn &&
+         difference.translation().norm() * mean_rho < kShift;
+}
+
 Mat6 covariance_of(const TrackingResult& tracking, double gradient_scatter) {
   const double variance = frame_variance(tracking.rmse, gradient_scatter);
   const Mat6 information = tracking.information / variance + 1e-6 * Mat6::Identity();
@@ -84,9 +93,21 @@ TrackingResult DirectOdometry::track_from_any(const TrackingReference& reference
   return out;
 }
 
+TrackingResult DirectOdometry::track_likely(const TrackingReference& reference,
+                                            const MonoFrame& frame, const KnownMotion& known) {
+  TrackingResult out = track_from_any(reference, frame, hypotheses_, known.expected);
+  if (is_nearly(out.T_current_reference, known.expected, reference.mean_rho)) return out;
+  LastTracking last = last_tracking_;
+  last.expected = known.expected;
+  const TrackingResult refined = tracker_.refine(reference, *frame.pyramid, frame.exposure_s,
+                                                 last_affine_, known.expected, last);
+  const bool reached = refined.good && is_reachable(known, refined.T_current_reference);
+  return reached && (!out.good || refined.rmse < out.rmse) ? refined : out;
+}
+
 TrackingResult DirectOdometry::align(const TrackingReference& reference, const MonoFrame& frame) {
   if (!known_motion_) return track_from_any(reference, frame, hypotheses_, std::nullopt);
-  TrackingResult likely = track_from_any(reference, frame, hypotheses_, known_motion_->expected);
+  TrackingResult likely = track_likely(reference, frame, *known_motion_);
   if (likely.good && likely.as_expected) return likely;
   const std::vector<SE3> knocked =
       tracker_.rank(reference, *frame.pyramid, frame.exposure_s, last_affine_,

@@ -39,4 +39,11 @@ struct ImmaturePoint {
   bool from_static_match() const { return static_information > 0.0F; }
 };
 
+/// Whether a static match tells a depth well enough to use it as it is: to about 15 %.
+/// `static_information`: on the inverse depth `rho`.
+inline bool knows_depth(double static_information, double rho) {
+  constexpr double kLeastInformation = 1000.0;  // on log-depth
+  return static_information * rho * rho >= kLeastInformation;
+}
+
 }  // namespace sovo

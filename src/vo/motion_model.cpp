@@ -21,6 +21,10 @@ bool is_reachable(const KnownMotion& known, const SE3& T_current_reference) {
 void MotionModel::note(const ReferenceKeyframe& reference, const SE3& T_camera_reference,
                        std::int64_t stamp_ns) {
   if (!past_.empty() && past_.back().stamp_ns == stamp_ns) past_.pop_back();
+  // A map's second frame tells how fast it began.
+  if (past_.empty() && stamp_ns > reference.stamp_ns) {
+    past_.push_back({SE3(), reference.log_scale, reference.keyframe_id, reference.stamp_ns});
+  }
   past_.push_back({T_camera_reference, reference.log_scale, reference.keyframe_id, stamp_ns});
   if (past_.size() > 2) past_.erase(past_.begin());
 }

@@ -10,8 +10,7 @@ namespace {
 
 constexpr int kIterations = 3;
 constexpr double kDepthStartLambda = 0.1;
-constexpr double kStopStep = 1e-4;                // relative
-constexpr double kMinStaticInformation = 1000.0;  // on log-depth: known to about 15 %
+constexpr double kStopStep = 1e-4;  // relative
 constexpr int kCandidateBlock = 32;
 constexpr double kComparableSize = 1.5;  // of a pattern, over that in its host
 
@@ -206,7 +205,7 @@ void PointActivator::optimize(const Window& window, double mean_rho, Candidate* 
   const double unit = mean_rho * mean_rho;
   double lambda = kDepthStartLambda;
   // A camera that turns on the spot shows no parallax, and yet needs points: those of stereo.
-  const bool known = p.static_information * p.rho * p.rho >= kMinStaticInformation;
+  const bool known = knows_depth(static_cast<double>(p.static_information), p.rho);
   if (now.hessian * unit < kMinRelativeInformation && !known) return;  // stays immature
   double best_rho = p.rho;
   judge(window, *candidate, 1.0, &now);

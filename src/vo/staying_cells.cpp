@@ -73,15 +73,15 @@ std::vector<float> displacements(const ReferenceLevel& level, const SE3& T) {
 /// Keeps the points of a level for which `wanted` is true of their index.
 template <class Wanted>
 void keep_if(ReferenceLevel* level, Wanted&& wanted) {
+  const auto all = {&level->u, &level->v, &level->rho, &level->colour, &level->weight};
+  const std::size_t size = level->size();
   std::size_t kept = 0;
-  for (std::size_t i = 0; i < level->size(); ++i) {
+  for (std::size_t i = 0; i < size; ++i) {
     if (!wanted(i)) continue;
-    for (auto* values : {&level->u, &level->v, &level->rho, &level->colour}) {
-      (*values)[kept] = (*values)[i];
-    }
+    for (auto* values : all) (*values)[kept] = (*values)[i];
     ++kept;
   }
-  for (auto* values : {&level->u, &level->v, &level->rho, &level->colour}) values->resize(kept);
+  for (auto* values : all) values->resize(kept);
 }
 
 }  // namespace

@@ -43,7 +43,7 @@ struct TrackedPoints {
 template <class F>
 struct Projected {
   F x, y, rho;                       ///< In the normalized image; inverse depth.
-  F colour;                          ///< In the reference.
+  F colour, weight;                  ///< In the reference.
   F fx, fy;                          ///< Position within its pixel.
   std::int32_t offset[lanes_of<F>];  ///< Of that pixel in the image.
   MaskOf<F> in_view;
@@ -70,6 +70,7 @@ SOVO_LANE_FUNCTION void project(const TrackedPoints& points, std::size_t i, Proj
   const F v = load_some<F>(points.level.v.data() + at, left);
   const F rho = load_some<F>(points.level.rho.data() + at, left);
   out->colour = load_some<F>(points.level.colour.data() + at, left);
+  out->weight = load_some<F>(points.level.weight.data() + at, left);
   const F px = w.m[0][0] * u + w.m[0][1] * v + w.m[0][2] + w.t[0] * rho;
   const F py = w.m[1][0] * u + w.m[1][1] * v + w.m[1][2] + w.t[1] * rho;
   const F pz = w.m[2][0] * u + w.m[2][1] * v + w.m[2][2] + w.t[2] * rho;
@@ -162,7 +163,7 @@ struct ResidualPass {
     const MaskOf<F> white = p.in_view & (s.value >= kWhite) & (r <= 0.0F);
     const MaskOf<F> inlier = p.in_view & ~white & (magnitude <= config.cutoff);
     const F hw = min_lane(lane_of<F>(1.0F), F(config.huber / magnitude));
-    const F energy = inlier ? F(hw * r * r * (2.0F - hw)) : saturated;
+    const F energy = p.weight * (inlier ? F(hw * r * r * (2.0F - hw)) : saturated);
     sums->energy[part] +=
         __builtin_convertvector(F((p.in_view & ~white) ? energy : zero), DoublesOf<F>);
     sums->in_view -= p.in_view;
@@ -173,7 +174,7 @@ struct ResidualPass {
     store_lane(F(inlier ? F(s.gx * points.warp.fx) : zero), to.gx + at);
     store_lane(F(inlier ? F(s.gy * points.warp.fy) : zero), to.gy + at);
     store_lane(F(inlier ? r : zero), to.residual + at);
-    store_lane(F(inlier ? hw : zero), to.weight + at);
+    store_lane(F(inlier ? F(hw * p.weight) : zero), to.weight + at);
     store_lane(p.colour, to.colour + at);
     return !none_of(inlier);
   }

@@ -18,12 +18,6 @@ namespace {
 
 constexpr int kBorder = 2;
 
-/// Weighted inverse depth of a pixel: sums of rho * w and of w.
-struct Cell {
-  int x = 0, y = 0;
-  float sum = 0.0F, weight = 0.0F;
-};
-
 /// Inverse depths of one level, sparse: the cells from left to right, row after row.
 class DepthMap {
  public:
@@ -31,7 +25,7 @@ class DepthMap {
 
   int width() const { return width_; }
   int height() const { return static_cast<int>(begins_.size()) - 1; }
-  std::span<const Cell> row(int y) const {
+  std::span<const SeenPoint> row(int y) const {
     const std::size_t begin = begins_[static_cast<std::size_t>(y)];
     return {cells_.data() + begin, begins_[static_cast<std::size_t>(y) + 1] - begin};
   }
@@ -39,7 +33,7 @@ class DepthMap {
 
   void reserve(std::size_t cells) { cells_.reserve(cells); }
   /// Appends to the row at hand. A cell beside the image is left out.
-  void add(const Cell& cell) {
+  void add(const SeenPoint& cell) {
     if (cell.x >= 0 && cell.x < width_) cells_.push_back(cell);
   }
   /// Closes row y, the one at hand: sorts it and adds up what fell into one pixel, in the order in
@@ -49,7 +43,7 @@ class DepthMap {
     // By insertion: rows are short, and this neither swaps equals nor allocates.
     for (auto next = begin; next != cells_.end(); ++next) {
       const auto place = std::upper_bound(begin, next, next->x,
-                                          [](int x, const Cell& cell) { return x < cell.x; });
+                                          [](int x, const SeenPoint& cell) { return x < cell.x; });
       std::rotate(place, next, next + 1);
     }
     auto kept = begin;
@@ -67,49 +61,29 @@ class DepthMap {
 
  private:
   int width_;
-  std::vector<Cell> cells_;
+  std::vector<SeenPoint> cells_;
   std::vector<std::uint32_t> begins_;  ///< Of the rows among the cells, and the end.
 };
 
-/// Window points in the newest keyframe, as they come; their number is `count`.
-std::vector<Cell> project_points(const Window& window, std::size_t* count) {
-  const Keyframe& newest = window.newest();
-  const auto slot = static_cast<std::size_t>(newest.slot);
-  const double rho_unit = window.mean_inverse_depth();
-  std::vector<Cell> cells;
-  cells.reserve(static_cast<std::size_t>(window.num_active_points()));
-  *count = 0;
-  const auto add = [&](float u, float v, float rho, float w) {
-    cells.push_back({static_cast<int>(u + 0.5F), static_cast<int>(v + 0.5F), rho * w, w});
-    ++*count;
-  };
-  for (int h = 0; h < window.size(); ++h) {
-    for (const Point& p : window[h].points) {
-      const double information = depth_information(p, rho_unit) * rho_unit * rho_unit;
-      const auto weight = static_cast<float>(std::sqrt(1e-3 * (information + 1e-6)));
-      if (h + 1 == window.size()) {
-        add(p.u, p.v, static_cast<float>(p.rho), weight);
-        continue;
-      }
-      const Residual& r = p.residuals[slot];
-      if (r.state == ResidualState::kIn) add(r.centre_u, r.centre_v, r.centre_rho, weight);
-    }
-  }
-  return cells;
+float splat_weight(double depth_information) {
+  return static_cast<float>(std::sqrt(1e-3 * (depth_information + 1e-6)));
 }
 
-DepthMap splat(const Window& window, std::size_t* count) {
-  const std::vector<Cell> cells = project_points(window, count);
+SeenPoint seen_point(float u, float v, float rho, float weight) {
+  return {static_cast<int>(u + 0.5F), static_cast<int>(v + 0.5F), rho * weight, weight};
+}
+
+DepthMap splat(const Window& window, std::span<const SeenPoint> points) {
   const int height = window.newest().image().height();
   // Sorted by counting how many come before each row.
   std::vector<std::uint32_t> ends(static_cast<std::size_t>(height) + 1);
-  const auto is_inside = [height](const Cell& c) { return c.y >= 0 && c.y < height; };
-  for (const Cell& c : cells) {
+  const auto is_inside = [height](const SeenPoint& c) { return c.y >= 0 && c.y < height; };
+  for (const SeenPoint& c : points) {
     if (is_inside(c)) ++ends[static_cast<std::size_t>(c.y) + 1];
   }
   std::partial_sum(ends.begin(), ends.end(), ends.begin());
-  std::vector<Cell> by_row(ends.back());
-  for (const Cell& c : cells) {
+  std::vector<SeenPoint> by_row(ends.back());
+  for (const SeenPoint& c : points) {
     if (is_inside(c)) by_row[ends[static_cast<std::size_t>(c.y)]++] = c;
   }
   DepthMap map(window.newest().image().width(), height);
@@ -127,7 +101,7 @@ DepthMap sum_down(const DepthMap& fine) {
   coarse.reserve(fine.size());
   for (int y = 0; y < coarse.height(); ++y) {
     for (const int fine_y : {2 * y, 2 * y + 1}) {
-      for (const Cell& c : fine.row(fine_y)) coarse.add({c.x / 2, y, c.sum, c.weight});
+      for (const SeenPoint& c : fine.row(fine_y)) coarse.add({c.x / 2, y, c.sum, c.weight});
     }
     coarse.close_row(y);
   }
@@ -163,20 +137,20 @@ class DenseRows {
  private:
   using Offset = std::array<int, 2>;
 
-  std::vector<Cell>& dense(int y) { return dense_[static_cast<std::size_t>(y) % 3]; }
-  std::span<const Cell> sparse(int y) const { return map_.row(y); }
+  std::vector<SeenPoint>& dense(int y) { return dense_[static_cast<std::size_t>(y) % 3]; }
+  std::span<const SeenPoint> sparse(int y) const { return map_.row(y); }
   void fill(int y) {
-    for (const Cell& cell : sparse(y)) dense(y)[static_cast<std::size_t>(cell.x)] = cell;
+    for (const SeenPoint& cell : sparse(y)) dense(y)[static_cast<std::size_t>(cell.x)] = cell;
   }
   void clear(int y) {
-    for (const Cell& cell : sparse(y)) dense(y)[static_cast<std::size_t>(cell.x)] = {};
+    for (const SeenPoint& cell : sparse(y)) dense(y)[static_cast<std::size_t>(cell.x)] = {};
   }
   void want(int x) {
     if (x < 0 || x >= map_.width()) return;
     wanted_[static_cast<std::size_t>(x) / 64] |= std::uint64_t{1} << static_cast<unsigned>(x) % 64;
   }
   void mark(int row, bool middle) {
-    for (const Cell& cell : sparse(row)) {
+    for (const SeenPoint& cell : sparse(row)) {
       want(cell.x);
       if (middle) {
         want(cell.x - 1);
@@ -184,14 +158,14 @@ class DenseRows {
       }
     }
   }
-  Cell at(int x, int y) {
-    const Cell& own = dense(y)[static_cast<std::size_t>(x)];
+  SeenPoint at(int x, int y) {
+    const SeenPoint& own = dense(y)[static_cast<std::size_t>(x)];
     if (own.weight > 0.0F) return own;
     constexpr std::array<Offset, 4> kNeighbours = {{{0, -1}, {-1, 0}, {1, 0}, {0, 1}}};
-    Cell mean{.x = x, .y = y};
+    SeenPoint mean{.x = x, .y = y};
     int n = 0;
     for (const Offset& o : kNeighbours) {
-      const Cell& cell = dense(y + o[1])[static_cast<std::size_t>(x + o[0])];
+      const SeenPoint& cell = dense(y + o[1])[static_cast<std::size_t>(x + o[0])];
       if (cell.weight <= 0.0F) continue;
       mean.sum += cell.sum;
       mean.weight += cell.weight;
@@ -204,7 +178,7 @@ class DenseRows {
   }
 
   const DepthMap& map_;
-  std::array<std::vector<Cell>, 3> dense_;
+  std::array<std::vector<SeenPoint>, 3> dense_;
   std::vector<std::uint64_t> wanted_;
 };
 
@@ -214,8 +188,27 @@ constexpr std::size_t kDenseGrowth = 4;
 /// Levels that have points enough as they are: neighbours would cost more than they add.
 constexpr int kSparseLevels = 2;
 
+/// An edge that is off by a tenth of a pixel errs by more grey levels than a weak texture shows at
+/// all, which then would say nothing beside it.
+float gradient_weight(const ImageF& image, int x, int y, float gradient_constant) {
+  const float gx = 0.5F * (image.at(x + 1, y) - image.at(x - 1, y));
+  const float gy = 0.5F * (image.at(x, y + 1) - image.at(x, y - 1));
+  const float squared = gradient_constant * gradient_constant;
+  return squared / (squared + gx * gx + gy * gy);
+}
+
+/// One in the mean, so that residuals keep their unit.
+void normalize(AlignedVector<float>* weights) {
+  double sum = 0.0;
+  for (const float w : *weights) sum += static_cast<double>(w);
+  if (!(sum > 0.0)) return;
+  const auto factor = static_cast<float>(static_cast<double>(weights->size()) / sum);
+  for (float& w : *weights) w *= factor;
+}
+
 /// Appends a pixel, if it can be tracked.
-void add_point(const ImageF& image, int y, const Cell& cell, ReferenceLevel* level) {
+void add_point(const ImageF& image, int y, const SeenPoint& cell, float gradient_constant,
+               ReferenceLevel* level) {
   const bool inside = cell.x >= kBorder && cell.x < image.width() - kBorder;
   if (!inside || cell.weight <= 0.0F) return;
   const float rho = cell.sum / cell.weight;
@@ -225,28 +218,63 @@ void add_point(const ImageF& image, int y, const Cell& cell, ReferenceLevel* lev
   level->v.push_back(static_cast<float>(y));
   level->rho.push_back(rho);
   level->colour.push_back(colour);
+  level->weight.push_back(gradient_weight(image, cell.x, y, gradient_constant));
 }
 
 /// Points of a level: the pixels with a depth.
-void extract_sparse(const DepthMap& map, const ImageF& image, ReferenceLevel* level) {
+void extract_sparse(const DepthMap& map, const ImageF& image, float gradient_constant,
+                    ReferenceLevel* level) {
   for (int y = kBorder; y < image.height() - kBorder; ++y) {
-    for (const Cell& cell : map.row(y)) add_point(image, y, cell, level);
+    for (const SeenPoint& cell : map.row(y)) add_point(image, y, cell, gradient_constant, level);
   }
 }
 
 /// And their empty neighbours.
-void extract_dense(const DepthMap& map, const ImageF& image, ReferenceLevel* level) {
+void extract_dense(const DepthMap& map, const ImageF& image, float gradient_constant,
+                   ReferenceLevel* level) {
   DenseRows rows(map);
   for (int y = 1; y < image.height() - kBorder; ++y) {
-    rows.for_each(y, [&](Cell cell) {
-      if (y >= kBorder) add_point(image, y, cell, level);
+    rows.for_each(y, [&](SeenPoint cell) {
+      if (y >= kBorder) add_point(image, y, cell, gradient_constant, level);
     });
   }
 }
 
 }  // namespace
 
-TrackingReference build_tracking_reference(const Window& window, int num_levels) {
+std::vector<SeenPoint> active_points(const Window& window) {
+  const auto slot = static_cast<std::size_t>(window.newest().slot);
+  const double rho_unit = window.mean_inverse_depth();
+  std::vector<SeenPoint> seen;
+  seen.reserve(static_cast<std::size_t>(window.num_active_points()));
+  for (int h = 0; h < window.size(); ++h) {
+    for (const Point& p : window[h].points) {
+      const float weight = splat_weight(depth_information(p, rho_unit) * rho_unit * rho_unit);
+      if (h + 1 == window.size()) {
+        seen.push_back(seen_point(p.u, p.v, static_cast<float>(p.rho), weight));
+        continue;
+      }
+      const Residual& r = p.residuals[slot];
+      if (r.state != ResidualState::kIn) continue;
+      seen.push_back(seen_point(r.centre_u, r.centre_v, r.centre_rho, weight));
+    }
+  }
+  return seen;
+}
+
+std::vector<SeenPoint> matched_points(const Window& window) {
+  std::vector<SeenPoint> seen;
+  for (const ImmaturePoint& p : window.newest().immature) {
+    const float rho = 0.5F * (p.rho_min + p.rho_max);
+    if (!knows_depth(static_cast<double>(p.static_information), static_cast<double>(rho))) continue;
+    const float weight = splat_weight(static_cast<double>(p.static_information));
+    seen.push_back(seen_point(p.u, p.v, rho, weight));
+  }
+  return seen;
+}
+
+TrackingReference build_tracking_reference(const Window& window, std::span<const SeenPoint> points,
+                                           int num_levels, double gradient_constant) {
   const Keyframe& newest = window.newest();
   TrackingReference ref;
   ref.keyframe_id = newest.id;
@@ -257,16 +285,18 @@ TrackingReference build_tracking_reference(const Window& window, int num_levels)
   ref.T_world_camera = newest.T_world_camera();
   ref.levels.resize(static_cast<std::size_t>(num_levels));
 
-  DepthMap map = splat(window, &ref.num_window_points);
+  ref.num_window_points = points.size();
+  DepthMap map = splat(window, points);
   for (int l = 0; l < num_levels; ++l) {
     if (l > 0) map = sum_down(map);
     ReferenceLevel& level = ref.levels[static_cast<std::size_t>(l)];
     level.camera = window.camera().at_level(l);
     const auto extract = l < kSparseLevels ? extract_sparse : extract_dense;
-    for (auto* values : {&level.u, &level.v, &level.rho, &level.colour}) {
+    for (auto* values : {&level.u, &level.v, &level.rho, &level.colour, &level.weight}) {
       values->reserve(l < kSparseLevels ? map.size() : kDenseGrowth * map.size());
     }
-    extract(map, newest.pyramid->level(l), &level);
+    extract(map, newest.pyramid->level(l), static_cast<float>(gradient_constant), &level);
+    normalize(&level.weight);
   }
   double sum = 0.0;
   for (const float rho : ref.levels[0].rho) sum += rho;

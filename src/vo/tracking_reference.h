@@ -15,6 +15,7 @@ namespace sovo {
 struct ReferenceLevel {
   CameraModel camera;  ///< Of this level.
   AlignedVector<float> u, v, rho, colour;
+  AlignedVector<float> weight;  ///< By their gradients, 1 in the mean.
   std::size_t size() const { return u.size(); }
 };
 
@@ -32,10 +33,26 @@ struct TrackingReference : ReferenceKeyframe {
   std::size_t num_window_points = 0;  ///< Points that were splatted.
 };
 
-/// Builds the reference from the newest keyframe of the window: every point whose residual into
-/// it is an inlier is splatted with the weight of its depth information; coarser levels sum 2x2;
-/// empty neighbours are filled once (DSO, Sec. 3.1).
-TrackingReference build_tracking_reference(const Window& window, int num_levels);
+/// Weighted inverse depth of a pixel of the newest keyframe: sums of rho * w and of w.
+struct SeenPoint {
+  int x = 0, y = 0;
+  float sum = 0.0F, weight = 0.0F;
+};
+
+/// The active points that the newest keyframe sees: those whose residuals into it are inliers, with
+/// the weights of their depth information.
+std::vector<SeenPoint> active_points(const Window& window);
+
+/// The newest keyframe's own immature points whose depths stereo knows. Who drives fast sees what
+/// is near in one frame or two, so that it never becomes active; and only what is near tells how
+/// far one went.
+std::vector<SeenPoint> matched_points(const Window& window);
+
+/// Builds the reference from such points of the newest keyframe: they are splatted; coarser levels
+/// sum 2x2; empty neighbours are filled once (DSO, Sec. 3.1). `gradient_constant`: see
+/// `TrackerConfig`.
+TrackingReference build_tracking_reference(const Window& window, std::span<const SeenPoint> points,
+                                           int num_levels, double gradient_constant);
 
 /// Gradient that a quarter of some pixels remain below [grey levels/px]. Precondition: there are
 /// some, and none is at the image's edge.

@@ -214,6 +214,13 @@ class Robustness(SimTest):
                                    "--set", "sim.traffic=lorry", calibration=())
             self.expect_whole(truth, live, error_m)
 
+    def test_an_open_highway_shows_little_that_tells_how_far_one_went(self):
+        # Lines, barriers and clouds look alike wherever one is on them; the asphalt is gone in a
+        # frame or two.
+        for part in (("--frames", 90), ("--trajectory", "slip", "--reverse", "--frames", 90)):
+            truth, live = self.fly("highway", *part, "--set", "sim.traffic=busy", calibration=())
+            self.expect_whole(truth, live, 6.0)
+
     def test_rest_then_motion_then_rest(self):
         seconds = 63.0 if LONG else 8.0
         flight = self.trajectory(rest_motion_rest, seconds)

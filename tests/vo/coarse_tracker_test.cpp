@@ -24,7 +24,8 @@ Window one_keyframe(const SyntheticScene& scene, const Affine& affine = {}) {
 
 TrackingReference scene_reference(const SyntheticScene& scene, const Affine& affine = {}) {
   const Window window = one_keyframe(scene, affine);
-  return build_tracking_reference(window, window.newest().pyramid->num_levels());
+  return build_tracking_reference(window, active_points(window),
+                                  window.newest().pyramid->num_levels(), 50.0);
 }
 
 /// A way along the view, and a little to the side.
@@ -52,6 +53,7 @@ TEST_P(TrackerJacobian, AgreesWithCentralDifferencesOnASmoothImage) {
     level.v.push_back(static_cast<float>(v));
     level.rho.push_back(static_cast<float>(uniform(random, 0.2, 0.8)));
     level.colour.push_back(static_cast<float>(wave(u, v) + uniform(random, -8, 8)));
+    level.weight.push_back(static_cast<float>(uniform(random, 0.5, 1.5)));
   }
   using Residuals = Eigen::Matrix<double, 203, 1>;
   const auto residuals = [&](const Vec8& x) {
@@ -71,11 +73,14 @@ TEST_P(TrackerJacobian, AgreesWithCentralDifferencesOnASmoothImage) {
   const Residuals r = residuals(Vec8::Zero());
   const Eigen::Matrix<double, 203, 8> J =
       central_differences<203, 8>(residuals, Vec8(Vec8::Zero()), 1e-5);
-  const Residuals w = (huber / r.array().abs()).min(1.0);
+  const Residuals h = (huber / r.array().abs()).min(1.0);
+  const Residuals given =
+      Eigen::Map<const Eigen::Matrix<float, 203, 1>>(level.weight.data()).cast<double>();
+  const Residuals w = given.cwiseProduct(h);
   const Mat8 H = J.transpose() * w.asDiagonal() * J;
   const Vec8 b = J.transpose() * w.cwiseProduct(r);
   const double energy =
-      (w.array() * r.array().square() * (2.0 - w.array())).sum() / static_cast<double>(r.size());
+      (w.array() * r.array().square() * (2.0 - h.array())).sum() / static_cast<double>(r.size());
 
   TrackerConfig config;
   config.huber = huber;
@@ -200,7 +205,8 @@ TrackingResult tracked_beside_bars(double share) {
   k.points = scene_points(scene, camera, k.image(), {SE3()}, 0, 4);
   for (Point& p : k.points) p.hessian = 1e4;
   window.update_geometry();
-  TrackingReference reference = build_tracking_reference(window, first->num_levels());
+  TrackingReference reference =
+      build_tracking_reference(window, active_points(window), first->num_levels(), 50.0);
   reference.threshold_share = share;
   const ImagePyramidPtr second =
       pyramid_of(with_bars(scene_view(scene, camera, kMovedBesideBars.inverse())->level(0)));
@@ -217,35 +223,22 @@ TEST(CoarseTracker, WithLowThresholdsAShadowDoesNotOutweighWeakTexture) {
   EXPECT_GT((usual.T_current_reference * kMovedBesideBars.inverse()).log().norm(), 0.008);
 }
 
-TEST(WeakTexture, BringsThresholdsDownUnlessResidualsAreLarge) {
-  const WeakTextureConfig c;
-  EXPECT_EQ(threshold_share(c, 30.0, 20.0, 0.0), 1.0);
-  EXPECT_EQ(threshold_share(c, c.from_gradient, 20.0, 1.0), 1.0);
-  EXPECT_EQ(threshold_share(c, c.to_gradient, 20.0, 0.0), c.least_share);
-  EXPECT_EQ(threshold_share(c, 0.0, 20.0, 1.0), c.least_share);
-  const double middle = 0.5 * (c.from_gradient + c.to_gradient);
-  EXPECT_NEAR(threshold_share(c, middle, 20.0, 0.0), 0.5 * (1.0 + c.least_share), 1e-12);
-  EXPECT_NEAR(threshold_share(c, 0.0, 20.0, 4.0), c.least_rms * 4.0 / 20.0, 1e-12);
-  EXPECT_EQ(threshold_share(c, 0.0, 20.0, 9.0), 1.0);
-}
-
-TEST(WeakTexture, AQuarterOfTheGradientsIsLower) {
-  ReferenceLevel level;
-  ImageF image(64, 32);
-  // Ramps along the rows, steeper every eight of them.
-  for (int y = 0; y < 32; ++y) {
-    for (int x = 0; x < 64; ++x)
-      image.at(x, y) = static_cast<float>(x) * 0.25F * static_cast<float>(y / 8);
-  }
-  for (int row : {4, 12, 20, 28}) {  // slopes 0, 1/4, 1/2, 3/4
-    for (int x = 10; x < 50; ++x) {
-      level.u.push_back(static_cast<float>(x));
-      level.v.push_back(static_cast<float>(row));
-      level.rho.push_back(1.0F);
-      level.colour.push_back(image.at(x, row));
-    }
-  }
-  EXPECT_NEAR(lower_gradient(image, level.u, level.v), 0.25, 1e-6);
+TEST(CoarseTracker, RefinesAMotionThatIsNearlyRightOnTheFinestLevelsAlone) {
+  const SyntheticScene scene(3);
+  const TrackingReference reference = scene_reference(scene);
+  const SE3 truth(SO3::exp(Vec3(0.01, -0.02, 0.01)), Vec3(0.06, -0.03, 0.1));
+  const ImagePyramidPtr image = scene_view(scene, small_camera(), truth.inverse());
+  CoarseTracker tracker{TrackerConfig()};
+  const LastTracking last{.rmse = 3.0, .inlier_ratio = 0.9};
+  const SE3 near = SE3(SO3::exp(Vec3(0.002, 0.001, 0.0)), Vec3(0.004, 0.0, 0.004)) * truth;
+  const TrackingResult found = tracker.refine(reference, *image, 0.0, {}, near, last);
+  ASSERT_TRUE(found.good);
+  EXPECT_TRUE(found.as_expected);
+  EXPECT_LT((found.T_current_reference * truth.inverse()).log().norm(), 0.002);
+  // From far off it would take the coarser ones.
+  const SE3 far(SO3::exp(Vec3(0.0, 0.2, 0.0)), Vec3::Zero());
+  const TrackingResult lost = tracker.refine(reference, *image, 0.0, {}, far * truth, last);
+  EXPECT_FALSE(lost.as_expected);
 }
 
 std::vector<SE3> turns_of(double step, int most) {

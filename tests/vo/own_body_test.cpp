@@ -82,7 +82,7 @@ TEST(OwnBodyInView, IsNothingButTheBodyAndIsLeftOut) {
   DirectOdometry& vo = vehicle.odometry();
   EXPECT_TRUE(vo.co_moving_mask().empty());
   MapResult result;
-  for (int i = 1; i <= 60; ++i) {
+  for (int i = 1; i <= 75; ++i) {
     const TrackedFrame tracked = vehicle.track(drive(i));
     ASSERT_TRUE(tracked.tracking.good) << i;
     result = vehicle.map(tracked);

@@ -27,6 +27,7 @@ TrackingReference grid(const ImageF& image, float rho, float lower_rho) {
         level.v.push_back(static_cast<float>(y));
         level.rho.push_back(y < side / 2 ? rho : lower_rho);
         level.colour.push_back(l == 0 ? image.at(x, y) : 0.0F);
+        level.weight.push_back(1.0F);
       }
     }
   }
@@ -70,6 +71,7 @@ TEST(StayingCellsTest, PointsBeyondTheImageTellNothing) {
     level.v.push_back(beyond);
     level.rho.push_back(1.0F);
     level.colour.push_back(0.0F);
+    level.weight.push_back(1.0F);
   }
   EXPECT_EQ(staying_cells({}, kCells, reference, steep(4.0), {}), before);
 }

@@ -145,6 +145,7 @@ Result<Motion> load_motion(const SimConfig& config, const StereoRig& rig) {
   }
   switch (config.world) {
     case World::kStreet:
+    case World::kHighway:
       level_above_ground(&*poses, 1.65);
       break;
     case World::kLawn:

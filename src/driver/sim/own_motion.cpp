@@ -133,6 +133,19 @@ Motion drive_expressway() {
   return drive(way, 22.0, 8.0, 20.0);
 }
 
+/// 1000 m of motorway at 29 m/s through bends of 500 m and more.
+Motion drive_motorway() {
+  const auto way =
+      walk({{220.0, 0.0}, {260.0, 0.4}, {120.0, 0.0}, {280.0, -0.45}, {120.0, 0.0}}, 0.1);
+  return drive(way, 29.0, 4.0, 30.0);
+}
+
+/// Off a motorway by a slip road: 370 m, from 25 m/s down to 13 in a bend to the right.
+Motion drive_slip_road() {
+  const auto way = walk({{110.0, 0.0}, {60.0, -0.15}, {130.0, -1.9}, {70.0, 0.0}}, 0.1);
+  return drive(way, 25.0, 12.0, 30.0);
+}
+
 /// A flight of a small aircraft along the curve `path`, whose parameter at a time is `phase`: it
 /// looks along the curve, and leans as it speeds up and turns.
 template <class Path, class Phase>
@@ -230,6 +243,8 @@ const std::vector<NamedMotion>& motions_of(World world) {
   static const std::vector<NamedMotion> kHall{
       {"loops", fly_loops}, {"inspection", fly_inspection}, {"race", fly_race}};
   static const std::vector<NamedMotion> kSand{{"traverse", drive_rover}};
+  static const std::vector<NamedMotion> kHighway{{"motorway", drive_motorway},
+                                                 {"slip", drive_slip_road}};
   switch (world) {
     case World::kLawn:
       return kLawn;
@@ -239,6 +254,8 @@ const std::vector<NamedMotion>& motions_of(World world) {
       return kStreet;
     case World::kHall:
       return kHall;
+    case World::kHighway:
+      return kHighway;
     case World::kSand:
       break;
   }

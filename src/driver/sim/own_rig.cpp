@@ -42,7 +42,8 @@ StereoRig own_rig(World world) {
           camera(301.0, Distortion::kEquidistant, {-0.010, 0.003, -0.002, 0.0005}, -3.0, 2.0);
       place_right(0.18, {-0.003, 0.005, 0.002});
       break;
-    case World::kStreet:  // rectified, on a car's roof
+    case World::kStreet:
+    case World::kHighway:  // rectified, on a car's roof
       rig.left = camera(380.0, Distortion::kNone, {}, 0.0, -20.0);
       rig.right = rig.left;
       place_right(0.5, Vec3::Zero());

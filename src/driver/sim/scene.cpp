@@ -31,6 +31,11 @@ Layer stretched(int texture, double scale_x, double scale_y, Blend blend, float 
   return l;
 }
 
+Layer on_world(Layer layer) {
+  layer.world = true;
+  return layer;
+}
+
 int SceneBuilder::texture(const ImageF& pattern) {
   scene_.textures.emplace_back(pattern);
   return static_cast<int>(scene_.textures.size()) - 1;
@@ -44,6 +49,13 @@ int SceneBuilder::material(Material material) {
   }
   scene_.materials.push_back(std::move(material));
   return static_cast<int>(scene_.materials.size()) - 1;
+}
+
+int SceneBuilder::material(float base, std::vector<Layer> layers) {
+  Material m;
+  m.base = base;
+  m.layers = std::move(layers);
+  return material(std::move(m));
 }
 
 int SceneBuilder::cutout(const Cutout& cutout, double width, double height) {

@@ -114,6 +114,8 @@ class SceneBuilder {
  public:
   int texture(const ImageF& pattern);
   int material(Material material);
+  /// Opaque, of layers upon a base.
+  int material(float base, std::vector<Layer> layers);
   /// Material from a cutout, stretched over the surface it is used on.
   int cutout(const Cutout& cutout, double width, double height);
 
@@ -160,5 +162,8 @@ Layer layer(int texture, double scale, Blend blend, float amplitude, double angl
 
 /// The same with different scales along x and y.
 Layer stretched(int texture, double scale_x, double scale_y, Blend blend, float amplitude);
+
+/// The layer by the coordinates of the world, so that it goes on from surface to surface.
+Layer on_world(Layer layer);
 
 }  // namespace sovo::sim

@@ -8,11 +8,12 @@
 namespace sovo::sim {
 
 enum class World {
-  kLawn,    ///< Grass seen by someone who walks an 8 m square.
-  kPool,    ///< A swimming pool's floor seen by a vehicle that mows it in lanes of 3.6 m.
-  kStreet,  ///< Houses, trees and cars along a drive.
-  kHall,    ///< A machine hall around a small aircraft.
-  kSand,    ///< Sand that a rover drives over.
+  kLawn,     ///< Grass seen by someone who walks an 8 m square.
+  kPool,     ///< A swimming pool's floor seen by a vehicle that mows it in lanes of 3.6 m.
+  kStreet,   ///< Houses, trees and cars along a drive.
+  kHall,     ///< A machine hall around a small aircraft.
+  kSand,     ///< Sand that a rover drives over.
+  kHighway,  ///< A road through open country: asphalt, lines, crash barriers, a far background.
 };
 
 /// A side of the pair, or neither.
@@ -25,6 +26,7 @@ enum class Traffic {
   kLorry,       ///< A lorry close ahead, at the camera's own speed, that hides what is ahead.
   kOvertaking,  ///< Cars overtake.
   kOncoming,    ///< Cars come towards the camera.
+  kBusy,        ///< Cars overtake and come towards the camera, and one drives ahead.
 };
 
 /// What the cameras see of the vehicle that carries them.
@@ -43,22 +45,24 @@ enum class TrajectoryBody {
 };
 
 /// Names of enum values in configuration files, found by argument-dependent lookup.
-constexpr std::array<std::pair<World, const char*>, 5> enum_names(World) {
+constexpr std::array<std::pair<World, const char*>, 6> enum_names(World) {
   return {{{World::kLawn, "lawn"},
            {World::kPool, "pool"},
            {World::kStreet, "street"},
            {World::kHall, "hall"},
-           {World::kSand, "sand"}}};
+           {World::kSand, "sand"},
+           {World::kHighway, "highway"}}};
 }
 constexpr const char* name_of(World world) {
   return enum_names(world)[static_cast<std::size_t>(world)].second;
 }
-constexpr std::array<std::pair<Traffic, const char*>, 5> enum_names(Traffic) {
+constexpr std::array<std::pair<Traffic, const char*>, 6> enum_names(Traffic) {
   return {{{Traffic::kNone, "none"},
            {Traffic::kCar, "car"},
            {Traffic::kLorry, "lorry"},
            {Traffic::kOvertaking, "overtaking"},
-           {Traffic::kOncoming, "oncoming"}}};
+           {Traffic::kOncoming, "oncoming"},
+           {Traffic::kBusy, "busy"}}};
 }
 constexpr std::array<std::pair<Body, const char*>, 3> enum_names(Body) {
   return {{{Body::kNone, "none"}, {Body::kBonnet, "bonnet"}, {Body::kArms, "arms"}}};
@@ -190,7 +194,7 @@ struct SimConfig {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v("world", world, "lawn, pool, street, hall or sand");
+    v("world", world, "lawn, pool, street, hall, sand or highway");
     v("seed", seed, "of the world and the noise");
     v("frame_rate", frame_rate, "pairs a second of the world's time [Hz]; 0: what suits it");
     v("trajectory", trajectory,
@@ -199,7 +203,8 @@ struct SimConfig {
     v("trajectory_times", trajectory_times, "KITTI times file of the trajectory");
     v("trajectory_body", trajectory_body, "of which body the trajectory file's poses are");
     v("traffic", traffic,
-      "vehicles that move in the street: none, car or lorry ahead, overtaking or oncoming");
+      "vehicles that move on the road: none, car or lorry ahead, overtaking, oncoming, or busy for "
+      "all but the lorry");
     v("own_shadow", own_shadow, "a rover carries the cameras, whose shadow moves with them");
     v("own_body", own_body, "what the cameras see of their vehicle: none, bonnet or arms");
     v("threads", threads, "1 or 2: cameras rendered at once; changes no pixel");

@@ -98,8 +98,11 @@ Result<void> check(const SimConfig& config) {
   if (config.frame_rate < 0.0 || config.frame_rate > 1000.0) {
     return Error{"frame_rate must be at most 1000 Hz, or 0 for the world's own"};
   }
-  if (config.traffic != Traffic::kNone && config.world != World::kStreet) {
-    return Error{"there is traffic in the street only; leave it at none, or choose that world"};
+  const bool road = config.world == World::kStreet || config.world == World::kHighway;
+  if (config.traffic != Traffic::kNone && !road) {
+    return Error{
+        "there is traffic in the street and on the highway only; leave it at none, or choose one "
+        "of those worlds"};
   }
   if (config.start < 0) return Error{"start must not be negative"};
   if (!(s.veil >= 0.0 && s.veil <= 0.99)) return Error{"sensor.veil must be in [0, 0.99]"};

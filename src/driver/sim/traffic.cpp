@@ -11,8 +11,6 @@
 namespace sovo::sim {
 namespace {
 
-constexpr double kOtherLane = 2.3;  ///< To the left of the camera's way [m].
-
 /// The way of a motion over the ground, with straight ends, and how far along it the camera is.
 class GroundTrack {
  public:
@@ -83,8 +81,10 @@ using Place = std::function<std::optional<SE3>(double t)>;
 
 class TrafficBuilder {
  public:
-  TrafficBuilder(const Motion& motion, const TrafficMaterials& materials, SceneBuilder& b)
-      : m_(materials),
+  TrafficBuilder(const Motion& motion, const Lanes& lanes, const TrafficMaterials& materials,
+                 SceneBuilder& b)
+      : lanes_(lanes),
+        m_(materials),
         b_(b),
         track_(std::make_shared<const GroundTrack>(motion)),
         duration_(motion.duration_s()) {}
@@ -98,24 +98,26 @@ class TrafficBuilder {
     let_move(first, ahead(gap + 4.0));
   }
 
-  /// Cars that overtake the camera on its left, `apart`, `faster` by that many m/s.
-  void overtaking(double apart, double faster) {
+  /// Cars that overtake the camera on its left, `apart`.
+  void overtaking(double apart) {
+    const double faster = lanes_.faster;
     const int count = static_cast<int>(faster * duration_ / apart) + 1;
     for (int k = 0; k < count; ++k) {
       const double behind = apart * (k + 0.4);
-      add_car_at(k, [track = track_, behind, faster](double t) {
-        return track->pose_at(track->camera_at(t) - behind + faster * t, kOtherLane, false);
+      add_car_at(k, [track = track_, lane = lanes_.other, behind, faster](double t) {
+        return track->pose_at(track->camera_at(t) - behind + faster * t, lane, false);
       });
     }
   }
 
-  /// Cars that come towards the camera on its left, `apart`, at `speed`.
-  void oncoming(double apart, double speed) {
+  /// Cars that come towards the camera on its left, `apart`.
+  void oncoming(double apart) {
+    const double speed = lanes_.oncoming_speed;
     const int count = static_cast<int>((track_->length() + speed * duration_) / apart) + 1;
     for (int k = 0; k < count; ++k) {
       const double begin = apart * (k + 0.8);
-      add_car_at(k, [track = track_, begin, speed](double t) {
-        return track->pose_at(begin - speed * t, kOtherLane, true);
+      add_car_at(k, [track = track_, lane = lanes_.oncoming, begin, speed](double t) {
+        return track->pose_at(begin - speed * t, lane, true);
       });
     }
   }
@@ -138,6 +140,7 @@ class TrafficBuilder {
     b_.scene().movers.push_back({first, b_.scene().surfaces.size(), std::move(place)});
   }
 
+  Lanes lanes_;
   const TrafficMaterials& m_;
   SceneBuilder& b_;
   std::shared_ptr<const GroundTrack> track_;
@@ -146,9 +149,9 @@ class TrafficBuilder {
 
 }  // namespace
 
-void add_traffic(Traffic traffic, const Motion& motion, const TrafficMaterials& materials,
-                 SceneBuilder& b) {
-  TrafficBuilder builder(motion, materials, b);
+void add_traffic(Traffic traffic, const Motion& motion, const Lanes& lanes,
+                 const TrafficMaterials& materials, SceneBuilder& b) {
+  TrafficBuilder builder(motion, lanes, materials, b);
   switch (traffic) {
     case Traffic::kNone:
       return;
@@ -157,9 +160,13 @@ void add_traffic(Traffic traffic, const Motion& motion, const TrafficMaterials& 
     case Traffic::kLorry:
       return builder.lorry_ahead(7.0);
     case Traffic::kOvertaking:
-      return builder.overtaking(30.0, 5.0);
+      return builder.overtaking(30.0);
     case Traffic::kOncoming:
-      return builder.oncoming(40.0, 10.0);
+      return builder.oncoming(40.0);
+    case Traffic::kBusy:
+      builder.car_ahead(20.0);
+      builder.overtaking(45.0);
+      return builder.oncoming(60.0);
   }
 }
 

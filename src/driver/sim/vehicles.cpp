@@ -9,6 +9,15 @@ constexpr double kShadowHeight = 0.014;  ///< Above all pieces of the road [m].
 
 }  // namespace
 
+std::vector<int> car_paints(SceneBuilder& b, std::uint64_t seed) {
+  std::vector<int> paints;
+  for (unsigned i = 0; i < 5; ++i) {
+    const int car = b.texture(car_pattern(256, seed + i));
+    paints.push_back(b.material(0.0F, {stretched(car, 4.2, 0.95, Blend::kMax, 1.0F)}));
+  }
+  return paints;
+}
+
 void add_car(SceneBuilder& b, const VehicleMaterials& m, const Vec3& foot, double yaw) {
   const std::size_t first = b.box(foot, yaw, {4.2, 1.75, 0.85}, m.paint, m.paint);
   for (std::size_t i = first; i < first + 5; ++i) {

@@ -12,6 +12,8 @@ Scene build_scene(World world, const Motion& motion, std::uint64_t seed, Traffic
       return build_street(motion, seed, traffic);
     case World::kHall:
       return build_hall(motion, seed);
+    case World::kHighway:
+      return build_highway(motion, seed, traffic);
     case World::kSand:
       break;
   }

@@ -26,12 +26,12 @@ double own_frame_rate(World world);
 
 /// The motion of the left camera from a trajectory file, brought into the world: z up, the ground
 /// below it, beginning near the origin. Of which body the poses are, and which way is up, is found
-/// from the axis that stays upright, unless `body` says it. In the street, on the lawn and on
+/// from the axis that stays upright, unless `body` says it. On roads, on the lawn and on
 /// sand slow changes of height are taken away, for their ground is level, and what would dive below
 /// it lifts the whole way.
 Result<Motion> load_motion(const SimConfig& config, const StereoRig& rig);
 
-/// The world around a motion: nothing stands in its way. Precondition: `traffic` in the street
+/// The world around a motion: nothing stands in its way. Precondition: `traffic` on roads
 /// only.
 Scene build_scene(World world, const Motion& motion, std::uint64_t seed,
                   Traffic traffic = Traffic::kNone);
@@ -42,5 +42,6 @@ Scene build_pool(const Motion& motion, std::uint64_t seed);
 Scene build_street(const Motion& motion, std::uint64_t seed, Traffic traffic);
 Scene build_hall(const Motion& motion, std::uint64_t seed);
 Scene build_sand(const Motion& motion, std::uint64_t seed);
+Scene build_highway(const Motion& motion, std::uint64_t seed, Traffic traffic);
 
 }  // namespace sovo::sim

@@ -4,6 +4,7 @@
 
 #include "sovo/driver/sim/noise.h"
 #include "sovo/driver/sim/random.h"
+#include "sovo/driver/sim/road_line.h"
 #include "sovo/driver/sim/surroundings.h"
 #include "sovo/driver/sim/traffic.h"
 #include "sovo/driver/sim/vehicles.h"
@@ -23,64 +24,44 @@ struct StreetMaterials {
   std::vector<int> leaves;
 };
 
-int add_material(SceneBuilder& b, float base, std::vector<Layer> layers) {
-  Material material;
-  material.base = base;
-  material.layers = std::move(layers);
-  return b.material(std::move(material));
-}
-
-Layer on_world(Layer layer) {
-  layer.world = true;
-  return layer;
-}
-
 void make_ground(SceneBuilder& b, StreetMaterials* m, int noise, std::uint64_t seed) {
   const int asphalt = b.texture(asphalt_pattern(512, seed));
   const int slabs = b.texture(paving_pattern(512, 6, seed + 1));
   const int grass = b.texture(grass_pattern(512, seed + 2));
-  m->road = add_material(b, 0.26F,
-                         {on_world(layer(asphalt, 2.7, Blend::kAdd, 0.34F, 0.4)),
-                          on_world(layer(asphalt, 11.3, Blend::kAdd, 0.22F, 1.5)),
-                          on_world(layer(noise, 23.0, Blend::kMultiply, 0.9F, 0.9))});
-  m->pavement = add_material(b, 0.4F,
-                             {layer(slabs, 3.0, Blend::kAdd, 0.7F),
-                              on_world(layer(noise, 5.3, Blend::kMultiply, 0.8F, 0.7))});
-  m->kerb = add_material(b, 0.55F, {on_world(layer(noise, 1.7, Blend::kMultiply, 0.9F))});
-  m->mark = add_material(b, 0.85F, {on_world(layer(asphalt, 1.9, Blend::kMultiply, 0.7F))});
-  m->ground = add_material(
-      b, 0.03F,
-      {layer(grass, 3.7, Blend::kMax, 0.85F, 0.5), layer(noise, 13.0, Blend::kMultiply, 1.5F, 0.3),
-       layer(noise, 1.9, Blend::kMultiply, 0.9F, 1.3)});
-  m->hedge = add_material(
-      b, 0.04F,
-      {layer(grass, 2.1, Blend::kMax, 0.8F, 0.2), layer(noise, 1.7, Blend::kMultiply, 1.8F, 1.1)});
+  m->road = b.material(0.26F, {on_world(layer(asphalt, 2.7, Blend::kAdd, 0.34F, 0.4)),
+                               on_world(layer(asphalt, 11.3, Blend::kAdd, 0.22F, 1.5)),
+                               on_world(layer(noise, 23.0, Blend::kMultiply, 0.9F, 0.9))});
+  m->pavement = b.material(0.4F, {layer(slabs, 3.0, Blend::kAdd, 0.7F),
+                                  on_world(layer(noise, 5.3, Blend::kMultiply, 0.8F, 0.7))});
+  m->kerb = b.material(0.55F, {on_world(layer(noise, 1.7, Blend::kMultiply, 0.9F))});
+  m->mark = b.material(0.85F, {on_world(layer(asphalt, 1.9, Blend::kMultiply, 0.7F))});
+  m->ground = b.material(0.03F, {layer(grass, 3.7, Blend::kMax, 0.85F, 0.5),
+                                 layer(noise, 13.0, Blend::kMultiply, 1.5F, 0.3),
+                                 layer(noise, 1.9, Blend::kMultiply, 0.9F, 1.3)});
+  m->hedge = b.material(0.04F, {layer(grass, 2.1, Blend::kMax, 0.8F, 0.2),
+                                layer(noise, 1.7, Blend::kMultiply, 1.8F, 1.1)});
 }
 
 StreetMaterials street_materials(SceneBuilder& b, int noise, std::uint64_t seed) {
   StreetMaterials m;
   make_ground(b, &m, noise, seed);
-  m.roof = add_material(b, 0.25F,
-                        {layer(b.texture(brick_pattern(256, 16, seed + 4)), 4.0, Blend::kAdd, 0.5F),
+  m.roof =
+      b.material(0.25F, {layer(b.texture(brick_pattern(256, 16, seed + 4)), 4.0, Blend::kAdd, 0.5F),
                          layer(noise, 5.1, Blend::kMultiply, 1.0F)});
-  m.bark = add_material(b, 0.24F, {stretched(noise, 0.4, 2.3, Blend::kAdd, 0.6F)});
-  m.glass = add_material(b, 0.12F, {layer(noise, 2.7, Blend::kAdd, 0.45F, 0.2)});
-  m.pole = add_material(b, 0.35F, {layer(noise, 0.8, Blend::kAdd, 0.5F)});
-  m.sign = add_material(b, 0.0F,
-                        {layer(b.texture(machine_pattern(128, seed + 5)), 1.5, Blend::kMax, 1.2F)});
+  m.bark = b.material(0.24F, {stretched(noise, 0.4, 2.3, Blend::kAdd, 0.6F)});
+  m.glass = b.material(0.12F, {layer(noise, 2.7, Blend::kAdd, 0.45F, 0.2)});
+  m.pole = b.material(0.35F, {layer(noise, 0.8, Blend::kAdd, 0.5F)});
+  m.sign =
+      b.material(0.0F, {layer(b.texture(machine_pattern(128, seed + 5)), 1.5, Blend::kMax, 1.2F)});
   m.shadow = b.cutout(spot_cutout(128, 0.35, 2.4, seed + 6), 1.0, 1.0);
   m.block_shadow = b.cutout(spot_cutout(128, 0.5, 0.2, seed + 7), 1.0, 1.0);
   for (unsigned i = 0; i < 8; ++i) {
     const int facade = b.texture(facade_pattern(512, static_cast<int>(i), seed + 10 + i));
-    m.facades.push_back(add_material(b, 0.0F,
-                                     {stretched(facade, 5.0, 3.1, Blend::kMax, 1.0F),
-                                      layer(noise, 11.3, Blend::kMultiply, 0.9F, 0.2),
-                                      layer(noise, 2.3, Blend::kMultiply, 0.45F, 1.0)}));
+    m.facades.push_back(b.material(0.0F, {stretched(facade, 5.0, 3.1, Blend::kMax, 1.0F),
+                                          layer(noise, 11.3, Blend::kMultiply, 0.9F, 0.2),
+                                          layer(noise, 2.3, Blend::kMultiply, 0.45F, 1.0)}));
   }
-  for (unsigned i = 0; i < 5; ++i) {
-    const int car = b.texture(car_pattern(256, seed + 30 + i));
-    m.cars.push_back(add_material(b, 0.0F, {stretched(car, 4.2, 0.95, Blend::kMax, 1.0F)}));
-  }
+  m.cars = car_paints(b, seed + 30);
   for (unsigned i = 0; i < 3; ++i) {
     m.leaves.push_back(b.cutout(leaf_cutout(256, 230, 0.07, seed + 40 + i), 3.1, 3.1));
   }
@@ -92,53 +73,15 @@ TrafficMaterials traffic_materials(SceneBuilder& b, const StreetMaterials& m, in
                                    std::uint64_t seed) {
   TrafficMaterials out{m.cars, 0, m.glass, m.block_shadow};
   const int figures = b.texture(machine_pattern(256, seed));
-  out.lorry_paint = add_material(
-      b, 0.1F,
-      {layer(figures, 2.6, Blend::kMax, 1.0F), layer(noise, 1.9, Blend::kMultiply, 0.5F, 0.4)});
+  out.lorry_paint = b.material(0.1F, {layer(figures, 2.6, Blend::kMax, 1.0F),
+                                      layer(noise, 1.9, Blend::kMultiply, 0.5F, 0.4)});
   return out;
-}
-
-/// The middle line of the road, every two metres.
-std::vector<WayPoint> middle_line(const Motion& motion) {
-  std::vector<WayPoint> line;
-  for (const StampedPose& pose : motion.samples()) {
-    const Vec3& p = pose.T_world_body.translation();
-    if (line.empty()) {
-      const Vec3 ahead = pose.T_world_body.rotation() * Vec3::UnitZ();
-      line.push_back({0.0, p.x(), p.y(), std::atan2(ahead.y(), ahead.x())});
-      continue;
-    }
-    const WayPoint& last = line.back();
-    const double step = std::hypot(p.x() - last.x, p.y() - last.y);
-    if (step < 2.0) continue;
-    line.push_back({last.s + step, p.x(), p.y(), std::atan2(p.y() - last.y, p.x() - last.x)});
-  }
-  // The road goes on before the start and after the end.
-  for (int i = 0; i < 60; ++i) {
-    WayPoint p = line.back();
-    p.s += 2.5;
-    p.x += 2.5 * std::cos(p.heading);
-    p.y += 2.5 * std::sin(p.heading);
-    line.push_back(p);
-  }
-  for (int i = 0; i < 8; ++i) {
-    WayPoint p = line.front();
-    p.s -= 2.5;
-    p.x -= 2.5 * std::cos(p.heading);
-    p.y -= 2.5 * std::sin(p.heading);
-    line.insert(line.begin(), p);
-  }
-  return line;
-}
-
-Vec3 beside(const WayPoint& p, double left, double z = 0.0) {
-  return {p.x - left * std::sin(p.heading), p.y + left * std::cos(p.heading), z};
 }
 
 class StreetBuilder {
  public:
   StreetBuilder(SceneBuilder& b, const StreetMaterials& m, const Motion& motion, std::uint64_t seed)
-      : b_(b), m_(m), way_(motion), line_(middle_line(motion)), random_(seed) {}
+      : b_(b), m_(m), way_(motion), line_(road_line(motion, 20.0, 150.0)), random_(seed) {}
 
   void build() {
     b_.floor(Vec3(0.0, 0.0, -0.02), 0.0, 20000.0, 20000.0, m_.ground).unbounded = true;
@@ -159,8 +102,7 @@ class StreetBuilder {
     for (double s = begin(); s < end() - 3.0; s += 5.0) {
       const WayPoint a = place_on(line_, s);
       const WayPoint c = place_on(line_, s + 5.0);
-      WayPoint p = place_on(line_, s + 2.5);
-      p.heading = std::atan2(c.y - a.y, c.x - a.x);
+      const WayPoint p = piece_of(line_, s, 5.0);
       const double length = 5.0 + 8.0 * std::abs(c.heading - a.heading) + 0.1;
       const double z = 0.0015 * (piece++ % 7);
       b_.floor(beside(p, 1.6, z), p.heading, length, kRoad, m_.road);
@@ -290,7 +232,8 @@ Scene build_street(const Motion& motion, std::uint64_t seed, Traffic traffic) {
   b.scene().haze = 0.0018;
   b.scene().haze_colour = 0.8F;
   StreetBuilder(b, m, motion, combine(seed, 45)).build();
-  add_traffic(traffic, motion, traffic_materials(b, m, noise, combine(seed, 46)), b);
+  constexpr Lanes kLanes = {.other = 2.3, .oncoming = 2.3, .faster = 5.0, .oncoming_speed = 10.0};
+  add_traffic(traffic, motion, kLanes, traffic_materials(b, m, noise, combine(seed, 46)), b);
   return b.take();
 }
 

@@ -143,6 +143,7 @@ Result<void> check_window(const DirectConfig& vo) {
   const std::pair<const char*, double> thresholds[] = {
       {"tracker.huber", vo.tracker.huber},
       {"tracker.cutoff", vo.tracker.cutoff},
+      {"tracker.gradient_constant", vo.tracker.gradient_constant},
       {"points.huber", vo.points.huber},
       {"window.huber", vo.window.huber},
       {"window.gradient_constant", vo.window.gradient_constant}};

@@ -44,7 +44,7 @@ class MotionModel {
   /// The last frame's T_camera_reference, the identity when there was none.
   struct Forecast {
     SE3 last;
-    std::optional<KnownMotion> known;  ///< When two frames before are known.
+    std::optional<KnownMotion> known;  ///< When two frames before are, a map's first among them.
   };
 
   /// Of a frame at `stamp_ns`. `max_acceleration`: what `KnownMotion::reach` follows from [the

@@ -8,7 +8,19 @@ namespace sovo {
 namespace {
 
 constexpr float kUnknown = std::numeric_limits<float>::infinity();
+constexpr double kFar = 0.2;         ///< Mean inverse depths.
 constexpr float kViewBorder = 4.0F;  ///< What is nearer to the edge is as good as out of view [px].
+
+/// Takes `most` of `pixels`, evenly.
+void thin_evenly(std::size_t most, std::vector<SelectedPixel>* pixels) {
+  const std::size_t all = pixels->size();
+  if (all <= most) return;
+  std::size_t kept = 0;
+  for (std::size_t i = 0; i < all; ++i) {
+    if (i * most / all != (i + 1) * most / all) (*pixels)[kept++] = (*pixels)[i];
+  }
+  pixels->resize(kept);
+}
 
 }  // namespace
 
@@ -17,10 +29,12 @@ ViewForecast::ViewForecast(const Window& window)
       height_(window.camera().height),
       cells_x_((width_ + kCell - 1) / kCell),
       cells_y_((height_ + kCell - 1) / kCell),
-      rho_(static_cast<std::size_t>(cells_x_) * static_cast<std::size_t>(cells_y_), kUnknown) {
+      rho_(static_cast<std::size_t>(cells_x_) * static_cast<std::size_t>(cells_y_), kUnknown),
+      nearest_rho_(rho_) {
   const int newest = window.size() - 1;
   if (newest < 1) return;
   const PairGeometry& step = window.pair(newest - 1, newest);
+  far_rho_ = static_cast<float>(kFar * window.mean_inverse_depth());
   KRKi_ = step.KRKi;
   Kt_ = step.Kt;
   for (int h = 0; h < newest; ++h) add_host(window[h], &window.pair(h, newest));
@@ -46,9 +60,11 @@ void ViewForecast::add(float x, float y, float rho) {
         y < static_cast<float>(height_))) {
     return;
   }
-  float& cell = rho_[static_cast<std::size_t>(static_cast<int>(y) / kCell * cells_x_ +
-                                              static_cast<int>(x) / kCell)];
-  cell = std::min(cell, rho);
+  const auto cell = static_cast<std::size_t>(static_cast<int>(y) / kCell * cells_x_ +
+                                             static_cast<int>(x) / kCell);
+  const bool first = nearest_rho_[cell] == kUnknown;
+  rho_[cell] = std::min(rho_[cell], rho);
+  nearest_rho_[cell] = first ? rho : std::max(nearest_rho_[cell], rho);
 }
 
 /// Cells without a point have the depth of the farthest next to them.
@@ -73,16 +89,22 @@ double ViewForecast::keep_lasting(int wanted, std::vector<SelectedPixel>* pixels
   const auto leaving = std::count_if(pixels->begin(), pixels->end(), leaves);
   const bool believed = static_cast<double>(leaving) <= (1.0 - kLeastShare) * all;
   if (believed) std::erase_if(*pixels, leaves);
-  const std::size_t staying = pixels->size();
+  const auto far_begin = std::stable_partition(
+      pixels->begin(), pixels->end(), [this](const SelectedPixel& p) { return !is_far(p.x, p.y); });
+  std::vector<SelectedPixel> far(far_begin, pixels->end());
+  pixels->erase(far_begin, pixels->end());
   const auto most = static_cast<std::size_t>(std::max(0, wanted));
-  if (staying > most) {
-    std::size_t kept = 0;
-    for (std::size_t i = 0; i < staying; ++i) {
-      if (i * most / staying != (i + 1) * most / staying) (*pixels)[kept++] = (*pixels)[i];
-    }
-    pixels->resize(kept);
-  }
-  return all > 0.0 ? static_cast<double>(staying) / all : 1.0;
+  const auto few_far = static_cast<std::size_t>(kFarShare * static_cast<double>(most));
+  const std::size_t near = pixels->size();
+  const std::size_t useful = near + std::min(few_far, far.size());
+  thin_evenly(std::max(few_far, most - std::min(most, near)), &far);
+  thin_evenly(most - far.size(), pixels);
+  pixels->insert(pixels->end(), far.begin(), far.end());
+  return all > 0.0 ? std::max(kLeastShare, static_cast<double>(useful) / all) : 1.0;
+}
+
+bool ViewForecast::is_far(int x, int y) const {
+  return nearest_rho_[static_cast<std::size_t>(y / kCell * cells_x_ + x / kCell)] < far_rho_;
 }
 
 bool ViewForecast::stays(int x, int y) const {

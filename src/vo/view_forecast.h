@@ -21,8 +21,16 @@ class ViewForecast {
   /// a camera that was knocked does not go on like that.
   static constexpr double kLeastShare = 0.4;
 
+  /// True where all that is known nearby is so far that it hardly tells the way: it has less than a
+  /// tenth of the window's mean inverse depth.
+  bool is_far(int x, int y) const;
+
+  /// Part of the pixels that may be far as long as there are others: they tell the turn, and for
+  /// that few are enough.
+  static constexpr double kFarShare = 0.25;
+
   /// Leaves those that stay, or all when they are fewer than kLeastShare, `wanted` at most, evenly
-  /// taken. Returns the share that is believed to stay.
+  /// taken, of which kFarShare may be far. Returns the share that is of use, kLeastShare at least.
   double keep_lasting(int wanted, std::vector<SelectedPixel>* pixels) const;
 
  private:
@@ -38,7 +46,9 @@ class ViewForecast {
   int cells_y_;
   Eigen::Matrix3f KRKi_ = Eigen::Matrix3f::Identity();
   Eigen::Vector3f Kt_ = Eigen::Vector3f::Zero();
+  float far_rho_ = 0.0F;    ///< [1/m]
   std::vector<float> rho_;  ///< Of the farthest point of each cell [1/m]; infinite: of none.
+  std::vector<float> nearest_rho_;  ///< Of the nearest; infinite: of none.
 };
 
 }  // namespace sovo

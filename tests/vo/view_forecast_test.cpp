@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "vo/window_test_support.h"
 
 namespace sovo {
@@ -110,6 +112,70 @@ TEST(ViewForecast, KeepsAsManyAsAreWantedEvenly) {
   EXPECT_EQ(corner.size(), 20U);
   std::vector<SelectedPixel> none;
   EXPECT_DOUBLE_EQ(forecast.keep_lasting(40, &none), 1.0);
+}
+
+/// The plane, and what its upper half shows is a thousand times as far.
+Window window_below_clouds() {
+  Window window = plane_window(SE3(SO3(), Vec3(0, 0, -0.1)));
+  for (Point& p : window[0].points) p.rho *= p.v < 64.0F ? 1e-3 : 1.0;
+  return window;
+}
+
+/// `above` pixels of the upper half and `below` of the lower one, mixed.
+std::vector<SelectedPixel> pixels_of(int above, int below) {
+  std::vector<SelectedPixel> out;
+  for (int i = 0; i < std::max(above, below); ++i) {
+    const auto x = static_cast<std::int16_t>(20 + i % 160);
+    if (i < above) out.push_back({x, 20, 1, 0.0F});
+    if (i < below) out.push_back({x, 120, 1, 0.0F});
+  }
+  return out;
+}
+
+int far_ones(const std::vector<SelectedPixel>& pixels) {
+  return static_cast<int>(std::ranges::count(pixels, 20, &SelectedPixel::y));
+}
+
+TEST(ViewForecast, FewOfTheFarPixelsAreKeptWhereThereAreNearOnes) {
+  const ViewForecast forecast(window_below_clouds());
+  EXPECT_TRUE(forecast.is_far(100, 20));
+  EXPECT_FALSE(forecast.is_far(100, 120));
+
+  std::vector<SelectedPixel> pixels = pixels_of(200, 100);
+  // A quarter of the forty that are wanted; so, of 300, 110 are of use, which is too little to ask
+  // for even more.
+  EXPECT_DOUBLE_EQ(forecast.keep_lasting(40, &pixels), ViewForecast::kLeastShare);
+  EXPECT_EQ(pixels.size(), 40U);
+  EXPECT_EQ(far_ones(pixels), 10);
+  std::ranges::sort(pixels, {}, &SelectedPixel::x);
+  EXPECT_LT(pixels[5].x, 60) << "evenly taken";
+  EXPECT_GT(pixels[35].x, 90);
+
+  // Where near ones are wanting, far ones fill their places.
+  pixels = pixels_of(200, 30);
+  forecast.keep_lasting(100, &pixels);
+  EXPECT_EQ(pixels.size(), 100U);
+  EXPECT_EQ(far_ones(pixels), 70);
+
+  // And near ones those of few far ones.
+  pixels = pixels_of(4, 96);
+  EXPECT_DOUBLE_EQ(forecast.keep_lasting(50, &pixels), 1.0);
+  EXPECT_EQ(pixels.size(), 50U);
+  EXPECT_EQ(far_ones(pixels), 4);
+}
+
+TEST(ViewForecast, IsFarWhereEverythingIs) {
+  Window window = window_below_clouds();
+  window[1].points.push_back(make_point(window[1].image(), 101, 21, 1.0 / kDepth));
+  EXPECT_FALSE(ViewForecast(window).is_far(100, 20)) << "something near is seen there, too";
+  EXPECT_TRUE(ViewForecast(window).is_far(164, 20));
+
+  // Of a plane nothing is far, however far it is; nor where nothing is known.
+  Window plane = plane_window(SE3(SO3(), Vec3(0, 0, -0.1)));
+  for (Point& p : plane[0].points) p.rho = 1e-4;
+  EXPECT_FALSE(ViewForecast(plane).is_far(100, 20));
+  plane[0].points.clear();
+  EXPECT_FALSE(ViewForecast(plane).is_far(100, 20));
 }
 
 }  // namespace

@@ -11,16 +11,19 @@ constexpr float kUnknown = std::numeric_limits<float>::infinity();
 constexpr double kFar = 0.2;         ///< Mean inverse depths.
 constexpr float kViewBorder = 4.0F;  ///< What is nearer to the edge is as good as out of view [px].
 
-/// Takes `most` of `pixels`, evenly.
-void thin_evenly(std::size_t most, std::vector<SelectedPixel>* pixels) {
-  const std::size_t all = pixels->size();
-  if (all <= most) return;
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < all; ++i) {
-    if (i * most / all != (i + 1) * most / all) (*pixels)[kept++] = (*pixels)[i];
+/// Takes `most` of `all` that come one after the other, evenly.
+class EvenChoice {
+ public:
+  EvenChoice(std::size_t most, std::size_t all) : most_(std::min(most, all)), all_(all) {}
+  bool takes_next() {
+    const std::size_t i = next_++;
+    return i * most_ / all_ != (i + 1) * most_ / all_;
   }
-  pixels->resize(kept);
-}
+
+ private:
+  std::size_t most_, all_;
+  std::size_t next_ = 0;
+};
 
 }  // namespace
 
@@ -89,18 +92,27 @@ double ViewForecast::keep_lasting(int wanted, std::vector<SelectedPixel>* pixels
   const auto leaving = std::count_if(pixels->begin(), pixels->end(), leaves);
   const bool believed = static_cast<double>(leaving) <= (1.0 - kLeastShare) * all;
   if (believed) std::erase_if(*pixels, leaves);
-  const auto far_begin = std::stable_partition(
-      pixels->begin(), pixels->end(), [this](const SelectedPixel& p) { return !is_far(p.x, p.y); });
-  std::vector<SelectedPixel> far(far_begin, pixels->end());
-  pixels->erase(far_begin, pixels->end());
+  const auto far = static_cast<std::size_t>(
+      std::ranges::count_if(*pixels, [this](const SelectedPixel& p) { return is_far(p.x, p.y); }));
+  const std::size_t near = pixels->size() - far;
   const auto most = static_cast<std::size_t>(std::max(0, wanted));
   const auto few_far = static_cast<std::size_t>(kFarShare * static_cast<double>(most));
-  const std::size_t near = pixels->size();
-  const std::size_t useful = near + std::min(few_far, far.size());
-  thin_evenly(std::max(few_far, most - std::min(most, near)), &far);
-  thin_evenly(most - far.size(), pixels);
-  pixels->insert(pixels->end(), far.begin(), far.end());
-  return all > 0.0 ? std::max(kLeastShare, static_cast<double>(useful) / all) : 1.0;
+  const std::size_t far_most = std::max(few_far, most - std::min(most, near));
+  if (far <= few_far) {
+    EvenChoice choice(most, near + far);
+    std::erase_if(*pixels, [&](const SelectedPixel&) { return !choice.takes_next(); });
+  } else {
+    EvenChoice of_far(far_most, far);
+    EvenChoice of_near(most - std::min(far, far_most), near);
+    std::erase_if(*pixels, [&](const SelectedPixel& p) {
+      return !(is_far(p.x, p.y) ? of_far : of_near).takes_next();
+    });
+    // Where points are close together the first ones become active.
+    std::stable_partition(pixels->begin(), pixels->end(),
+                          [this](const SelectedPixel& p) { return !is_far(p.x, p.y); });
+  }
+  const auto useful = static_cast<double>(near + std::min(few_far, far));
+  return all > 0.0 ? std::max(kLeastShare, useful / all) : 1.0;
 }
 
 bool ViewForecast::is_far(int x, int y) const {

@@ -147,6 +147,7 @@ TEST(ViewForecast, FewOfTheFarPixelsAreKeptWhereThereAreNearOnes) {
   EXPECT_DOUBLE_EQ(forecast.keep_lasting(40, &pixels), ViewForecast::kLeastShare);
   EXPECT_EQ(pixels.size(), 40U);
   EXPECT_EQ(far_ones(pixels), 10);
+  EXPECT_EQ(far_ones({pixels.begin(), pixels.begin() + 30}), 0) << "near ones come first";
   std::ranges::sort(pixels, {}, &SelectedPixel::x);
   EXPECT_LT(pixels[5].x, 60) << "evenly taken";
   EXPECT_GT(pixels[35].x, 90);
@@ -157,11 +158,12 @@ TEST(ViewForecast, FewOfTheFarPixelsAreKeptWhereThereAreNearOnes) {
   EXPECT_EQ(pixels.size(), 100U);
   EXPECT_EQ(far_ones(pixels), 70);
 
-  // And near ones those of few far ones.
-  pixels = pixels_of(4, 96);
-  EXPECT_DOUBLE_EQ(forecast.keep_lasting(50, &pixels), 1.0);
-  EXPECT_EQ(pixels.size(), 50U);
-  EXPECT_EQ(far_ones(pixels), 4);
+  // Few far ones are taken as all others are, in their order.
+  pixels = pixels_of(9, 90);
+  EXPECT_DOUBLE_EQ(forecast.keep_lasting(66, &pixels), 1.0);
+  EXPECT_EQ(pixels.size(), 66U);
+  EXPECT_EQ(far_ones(pixels), 6) << "two of three, as of all";
+  EXPECT_TRUE(std::ranges::is_sorted(pixels, {}, &SelectedPixel::x));
 }
 
 TEST(ViewForecast, IsFarWhereEverythingIs) {

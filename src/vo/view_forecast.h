@@ -49,7 +49,7 @@ class ViewForecast {
   float far_rho_ = 0.0F;    ///< [1/m]
   std::vector<float> rho_;  ///< Of the farthest point of each cell [1/m]; infinite: of none.
   /// Of the nearest; infinite: of none. Gaps stay: with those next to them called far as well, a
-  /// highway drifted by a third more.
+  /// highway drifted by a third more in a version before.
   std::vector<float> nearest_rho_;
 };
 

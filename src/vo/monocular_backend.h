@@ -66,9 +66,8 @@ struct ReferenceKeyframe {
   /// Of that pose, since the map began: (translation, rotation) in world axes, carried to the
   /// origin (geometry/pose_covariance.h). Without what errors of scale add.
   Mat6 covariance = Mat6::Zero();
-  double mean_rho = 1.0;  ///< Mean inverse depth of its points [1/m].
-  /// Poses T_world_camera of all keyframes of the window, by id: earlier frames hang on them.
-  std::vector<std::pair<std::uint32_t, SE3>> keyframe_poses;
+  double mean_rho = 1.0;                   ///< Mean inverse depth of its points [1/m].
+  std::vector<WindowPose> keyframe_poses;  ///< Of the window: earlier frames hang on them.
 };
 
 /// Multiplies all lengths by `scale`, the newest keyframe's centre fixed.

@@ -1,5 +1,6 @@
 #include "sovo/vo/motion_model.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -40,24 +41,34 @@ double MotionModel::steps_to(std::int64_t stamp_ns) const {
   return static_cast<double>(stamp_ns - past_[1].stamp_ns) / static_cast<double>(before);
 }
 
+/// Of a frame that has become a keyframe, as it stands in the window: what it was found to be by
+/// itself may be far from that, and the step from there to the next keyframe no motion at all.
+std::optional<SE3> MotionModel::T_past_reference(const PastFrame& past,
+                                                 const ReferenceKeyframe& reference) {
+  const auto find = [&](const auto& is_wanted) {
+    const auto& all = reference.keyframe_poses;
+    const auto found = std::find_if(all.begin(), all.end(), is_wanted);
+    return found != all.end() ? &*found : nullptr;
+  };
+  const auto from_reference = [&](const WindowPose& keyframe) {
+    return keyframe.T_world_camera.inverse() * reference.T_world_camera;
+  };
+  if (past.stamp_ns == reference.stamp_ns) return SE3();
+  const auto* own = find([&](const WindowPose& k) { return k.stamp_ns == past.stamp_ns; });
+  if (own != nullptr) return from_reference(*own);
+  const auto* tracked = find([&](const WindowPose& k) { return k.id == past.keyframe_id; });
+  if (tracked == nullptr) return std::nullopt;
+  SE3 T = past.T_camera_keyframe;
+  T.translation() *= std::exp(reference.log_scale - past.log_scale);
+  return T * from_reference(*tracked);
+}
+
 MotionModel::Forecast MotionModel::forecast(const ReferenceKeyframe& reference,
                                             std::int64_t stamp_ns, double max_acceleration) const {
-  const SE3 T_reference_world = reference.T_world_camera.inverse();
-  // Past frames relative to the reference, in its scale.
   std::array<SE3, 2> from_reference;
   std::size_t known = 0;
   for (const PastFrame& past : past_) {
-    if (past.stamp_ns == reference.stamp_ns) {
-      from_reference[known++] = SE3();
-      continue;
-    }
-    for (const auto& [id, T_world_keyframe] : reference.keyframe_poses) {
-      if (id != past.keyframe_id) continue;
-      SE3 T = past.T_camera_keyframe;
-      T.translation() *= std::exp(reference.log_scale - past.log_scale);
-      from_reference[known++] = T * (T_reference_world * T_world_keyframe).inverse();
-      break;
-    }
+    if (const auto T = T_past_reference(past, reference)) from_reference[known++] = *T;
   }
   Forecast out;
   out.last = known == 0 ? SE3() : from_reference[known - 1];

@@ -62,6 +62,10 @@ class MotionModel {
     std::uint32_t keyframe_id = 0;
     std::int64_t stamp_ns = 0;
   };
+  /// T_camera_reference of a past frame, in the reference's scale; nothing when what it hangs on
+  /// has left the window.
+  static std::optional<SE3> T_past_reference(const PastFrame& past,
+                                             const ReferenceKeyframe& reference);
   double steps_to(std::int64_t stamp_ns) const;
 
   std::vector<PastFrame> past_;  ///< The last two frames, newest last.

@@ -302,7 +302,7 @@ TrackingReference build_tracking_reference(const Window& window, std::span<const
   for (const float rho : ref.levels[0].rho) sum += rho;
   if (sum > 0.0) ref.mean_rho = sum / static_cast<double>(ref.levels[0].size());
   for (int i = 0; i < window.size(); ++i) {
-    ref.keyframe_poses.emplace_back(window[i].id, window[i].T_world_camera());
+    ref.keyframe_poses.push_back({window[i].id, window[i].stamp_ns, window[i].T_world_camera()});
   }
   return ref;
 }

@@ -29,7 +29,7 @@ ReferenceKeyframe reference_at_start(double log_scale) {
   reference.stamp_ns = -1;
   reference.log_scale = log_scale;
   reference.T_world_camera = drive(0);
-  reference.keyframe_poses = {{3, drive(0)}};
+  reference.keyframe_poses = {{3, -1, drive(0)}};
   return reference;
 }
 

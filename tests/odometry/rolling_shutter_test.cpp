@@ -182,7 +182,7 @@ class ReadoutMotionTest : public testing::Test {
     motion_.emplace(*preparation_);
     reference_ = std::make_shared<ReferenceKeyframe>();
     reference_->stamp_ns = 0;
-    reference_->keyframe_poses = {{0, SE3()}};
+    reference_->keyframe_poses = {{0, reference_->stamp_ns, SE3()}};
     motion_->begin(*reference_);
     for (int i = 1; i < 4; ++i) motion_->note(tracked(i));
   }

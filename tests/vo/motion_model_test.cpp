@@ -14,7 +14,7 @@ ReferenceKeyframe reference_at(std::uint32_t id, const SE3& T_world_camera) {
   out.keyframe_id = id;
   out.stamp_ns = -1;
   out.T_world_camera = T_world_camera;
-  out.keyframe_poses = {{id, T_world_camera}};
+  out.keyframe_poses = {{id, -1, T_world_camera}};
   return out;
 }
 
@@ -53,7 +53,7 @@ TEST(MotionModel, FollowsItsKeyframesIntoANewReferenceAndANewScale) {
   // The next keyframe stands a way off, and the map was made twice as large since.
   SE3 T_world_next(SO3::exp(Vec3(0, 0.1, 0)), Vec3(0.2, 0.0, 1.0));
   ReferenceKeyframe next = reference_at(1, T_world_next);
-  next.keyframe_poses.emplace_back(0, SE3());
+  next.keyframe_poses.push_back({0, -1, SE3()});
   next.log_scale = std::log(2.0);
   const auto known = model.forecast(next, 3 * kFrame, 0.0).known;
   ASSERT_TRUE(known);
@@ -65,6 +65,20 @@ TEST(MotionModel, FollowsItsKeyframesIntoANewReferenceAndANewScale) {
   EXPECT_LT((known->expected * truth.inverse()).log().norm(), 1e-9);
   EXPECT_FALSE(model.forecast(reference_at(7, SE3()), 3 * kFrame, 0.0).known)
       << "the keyframe that it hangs on has left the window";
+}
+
+TEST(MotionModel, OfKeyframesItTakesTheirPosesInTheWindow) {
+  const ReferenceKeyframe old = reference_at(0, SE3());
+  MotionModel model;
+  const SE3 wrong(SO3(), Vec3(0.0, 0.0, -0.15));
+  model.note(old, wrong * on_its_way(1.0), kFrame);
+  model.note(old, on_its_way(2.0), 2 * kFrame);
+  // Bundle adjustment has found out where the first of both frames was, which became a keyframe.
+  ReferenceKeyframe next = reference_at(0, SE3());
+  next.keyframe_poses.push_back({1, kFrame, on_its_way(1.0).inverse()});
+  const auto known = model.forecast(next, 3 * kFrame, 0.0).known;
+  ASSERT_TRUE(known);
+  EXPECT_LT((known->expected * on_its_way(3.0).inverse()).log().norm(), 1e-9);
 }
 
 TEST(MotionModel, AccelerationLimitsTheReach) {

@@ -302,9 +302,7 @@ void FeatureOdometry::publish_reference() {
   next->T_world_camera = newest.T_camera_world.inverse();
   next->covariance = history_.covariance();
   next->mean_rho = window_.mean_inverse_depth();
-  for (const WindowPose& k : window_.poses()) {
-    next->keyframe_poses.emplace_back(k.id, k.T_world_camera);
-  }
+  next->keyframe_poses = window_.poses();
   for (const Landmark& l : window_.landmarks) {
     const Observation* seen = l.seen_in(newest.id);
     ReferenceFeature f;

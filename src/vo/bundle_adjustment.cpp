@@ -285,20 +285,21 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   }
   problem_.pose(collect_points(window), window);
   window->update_geometry();
-  problem_.stored(&known_);
-  now_ = next_ = known_;
+  problem_.stored(&now_);
   const auto newest = static_cast<unsigned>(window->size() - 1);
-  problem_.linearize(known_, {.system = false, .statics = false, .targets = 1U << newest}, &now_);
+  problem_.linearize(now_, {.system = false, .statics = false, .targets = 1U << newest}, &now_);
   update_outlier_threshold(now_, window);
-  problem_.linearize(known_, {}, &now_);
-  const SE3 oldest = (*window)[0].T_world_camera();
+  problem_.linearize(now_, {}, &now_);
+  const std::vector<SE3> before = window->poses();
   const NormalEquations solved = iterate(window, &result);
   if (!result.finite) return result;
 
   window->newest().freeze();
   // A step without gauge moves all keyframes by their share of what the newest one needs: what
-  // tracking errs alike each time would drive the world along.
-  window->hold_oldest(oldest);
+  // tracking errs alike each time would drive the world along. The map's first keyframe is the
+  // world; later, little may be seen of the oldest one, and the world must not shake with it.
+  const int held = (*window)[0].id == 0 ? 0 : window->steadiest(before);
+  window->hold(held, before[static_cast<std::size_t>(held)]);
   update_outlier_threshold(now_, window);
   problem_.reclassify(&now_);
   problem_.write_back(now_);
@@ -315,8 +316,10 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   result.newest_covariance =
       keyframe_variance(result.rmse, result.gradient_scatter) * newest_covariance(*window, solved);
   if (const double information = scale_information(now_, problem_.points()); information > 0.0) {
-    // Static residuals weigh more than their noise would have it.
-    const double noise = keyframe_variance(result.rmse, result.gradient_scatter);
+    // Static residuals weigh more than their noise would have it, and those of a keyframe share the
+    // errors of its right image.
+    constexpr double kSharedRight = 1.6;
+    const double noise = kSharedRight * keyframe_variance(result.rmse, result.gradient_scatter);
     result.scale_variance = config_.static_weight * noise / information;
   }
   drop_bad_residuals(window);

@@ -28,13 +28,13 @@ inline constexpr double kLeastScatter = 0.3;
 /// squared], from their RMS and `PhotometricProblem::gradient_scatter`: neighbouring pixels err
 /// alike, as measured, and so do a point's keyframes, which share its host's pixels.
 inline double keyframe_variance(double rmse, double gradient_scatter) {
-  constexpr double kSharedHost = 8.0;
+  constexpr double kSharedHost = 5.0;
   return kSharedHost * std::max(gradient_scatter, kLeastScatter) * std::max(rmse * rmse, 1.0);
 }
 
 /// The same of a frame's alignment, whose finest levels look at one pixel of each point.
 inline double frame_variance(double rmse, double gradient_scatter) {
-  constexpr double kSharedReference = 3.0;
+  constexpr double kSharedReference = 2.0;
   return kSharedReference * std::max(gradient_scatter, kLeastScatter) * std::max(rmse * rmse, 1.0);
 }
 
@@ -96,7 +96,7 @@ class BundleAdjuster {
   WindowConfig config_;
   // For their memory alone: each bundle adjustment begins anew.
   PhotometricProblem problem_;
-  WindowLinearization known_, now_, next_;
+  WindowLinearization now_, next_;
 };
 
 }  // namespace sovo

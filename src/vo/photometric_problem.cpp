@@ -92,19 +92,11 @@ void PhotometricProblem::pose(std::vector<PointRef> points, Window* window) {
     blocks_.back().end = i + 1;
   }
   sums_.resize(blocks_.size());
-  forget_samples();
-}
-
-void PhotometricProblem::forget_samples() {
-  const auto forget = [](std::size_t count, AlignedVector<SampledResidual>* samples) {
-    if (samples->size() < count) samples->resize(count);
-    for (std::size_t i = 0; i < count; ++i) {
-      (*samples)[i].linearization = -1;
-      (*samples)[i].blur.known = false;
-    }
-  };
-  forget(first_.back(), &sampled_);
-  if (window_->rig() != nullptr) forget(points_.size(), &sampled_statics_);
+  ++problem_;
+  if (sampled_.size() < first_.back()) sampled_.resize(first_.back());
+  if (window->rig() != nullptr && sampled_statics_.size() < points_.size()) {
+    sampled_statics_.resize(points_.size());
+  }
 }
 
 /// A pixel of parallax or less is lost in blur, and in what else moves all points of an image
@@ -157,7 +149,7 @@ void PhotometricProblem::remember_poses() {
 bool PhotometricProblem::is_settled(const Block& block, std::size_t point, std::size_t residual,
                                     int target, PatternShift* shift) const {
   const SampledResidual& at = sampled_[residual];
-  if (at.linearization < 0 || config_.resample_px <= 0.0) return false;
+  if (at.problem != problem_ || at.linearization < 0 || config_.resample_px <= 0.0) return false;
   const auto rho_change = static_cast<float>(points_[point].point->rho - at.rho);
   *shift = pattern_shift(
       at.linearized,
@@ -201,6 +193,7 @@ void PhotometricProblem::linearize_block(const Block& block, const WindowLineari
           shift_residual(shifts_[pair_index(block.host, target)], &moved[count]);
           r = &moved[count];
         }
+        out->residuals[k].target = known.residuals[k].target;
         store(*r, &out->residuals[k]);
         depth.add(out->residuals[k]);
         residuals[count++] = {target, r};
@@ -209,6 +202,8 @@ void PhotometricProblem::linearize_block(const Block& block, const WindowLineari
         evaluate_static(block, i, known.statics[i], &out->statics[i]);
         *energy += static_cast<double>(out->statics[i].energy);
         depth.add(out->statics[i]);
+      } else {
+        out->statics[i] = known.statics[i];
       }
       out->depths[i] = depth;
       if (request.system) {
@@ -243,6 +238,8 @@ const LinearizedResidual* PhotometricProblem::evaluate(const Block& block, std::
     moved->energy = verdict.energy;
     return moved;
   }
+  if (at.problem != problem_) at.blur.known = false;
+  at.problem = problem_;
   const Point& p = *points_[point].point;
   linearize_projected(*window_, config_, block.host, known.target, p, known_residual(known),
                       step.projection, &at.blur, &at.linearized);
@@ -277,12 +274,14 @@ void PhotometricProblem::evaluate_static(const Block& block, std::size_t point,
   const PatternShift shift = {at.linearized.du_rho * rho_change, at.linearized.dv_rho * rho_change,
                               0.0F, 0.0F};
   const auto limit = static_cast<float>(config_.resample_px);
-  if (at.linearization >= 0 && shift.u * shift.u + shift.v * shift.v <= limit * limit) {
+  if (at.problem == problem_ && at.linearization >= 0 &&
+      shift.u * shift.u + shift.v * shift.v <= limit * limit) {
     LinearizedResidual moved = at.linearized;
     move_residual(shift, &moved);
     *out = stored_static(host, moved);
     return;
   }
+  at.problem = problem_;
   linearize_static(*window_->rig(), config_, host, p, &at.linearized);
   at.rho = p.rho;
   const bool in_view = at.linearized.state != ResidualState::kOutOfView;
@@ -296,7 +295,9 @@ void PhotometricProblem::evaluate_static(const Block& block, std::size_t point,
 
 void PhotometricProblem::linearize(const WindowLinearization& known, const Request& request,
                                    WindowLinearization* out) {
-  if (out->residuals.size() != known.residuals.size()) *out = known;
+  out->residuals.resize(known.residuals.size());
+  out->statics.resize(known.statics.size());
+  out->depths.resize(known.depths.size());
   std::vector<double> energies(blocks_.size());
   remember_poses();
   if (request.at_frozen_poses) shifts_ = relative_displacements(*window_, states_.back());
@@ -369,7 +370,7 @@ double PhotometricProblem::gradient_scatter(const WindowLinearization& at, int t
   for (std::size_t i = 0; i < at.residuals.size(); ++i) {
     const StoredResidual& stored = at.residuals[i];
     if (stored.target != target || stored.state != ResidualState::kIn) continue;
-    if (sampled_[i].linearization < 0) continue;
+    if (sampled_[i].problem != problem_ || sampled_[i].linearization < 0) continue;
     const ShiftPart part = shift_part(sampled_[i].linearized);
     squared_gradients += static_cast<double>(part.squared_gradient);
     hessians += static_cast<double>(part.hessian);

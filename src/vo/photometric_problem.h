@@ -40,12 +40,14 @@ struct alignas(64) StoredResidual {
 };
 static_assert(sizeof(StoredResidual) == 64);
 
-/// A residual as it was last sampled.
+/// A residual as it was last sampled. What is left of an earlier problem says so itself: to go over
+/// all of them before the first is sampled would take as long as an iteration.
 struct SampledResidual {
   LinearizedResidual linearized;
   PatternBlur blur;
-  double rho = 0.0;        ///< Inverse depth of its point then.
-  int linearization = -1;  ///< Which one that was; -1: none, or out of view.
+  double rho = 0.0;           ///< Inverse depth of its point then.
+  int linearization = -1;     ///< Which one that was; -1: none, or out of view.
+  std::uint32_t problem = 0;  ///< In which all of this was found out; 0: none.
 };
 
 /// What is kept of a point's linearized residual in its host's right image.
@@ -122,6 +124,7 @@ class PhotometricProblem {
   /// residual is sampled again where its pattern has moved by more than `resample_px` since it was;
   /// otherwise it is taken along its own Jacobian. Between the older keyframes little moves in one
   /// bundle adjustment, and sampling is most of the work.
+  /// `out` may be `known`.
   void linearize(const WindowLinearization& known, const Request& request,
                  WindowLinearization* out);
 
@@ -171,8 +174,6 @@ class PhotometricProblem {
   StoredStatic stored_static(const Keyframe& host, const LinearizedResidual& r) const;
   void linearize_block(const Block& block, const WindowLinearization& known, const Request& request,
                        WindowLinearization* out, HostSums* sums, double* energy);
-  /// Every residual is sampled when it is linearized next, and its blur found out.
-  void forget_samples();
 
   WindowConfig config_;
   WorkerPool* pool_;
@@ -184,6 +185,7 @@ class PhotometricProblem {
   std::vector<std::size_t> first_;  ///< First residual of each point, and one past the last.
   std::vector<Block> blocks_;
   std::vector<HostSums> sums_;                      ///< Of each block.
+  std::uint32_t problem_ = 0;                       ///< How many have been posed.
   AlignedVector<SampledResidual> sampled_;          ///< Every residual, and memory for more.
   AlignedVector<SampledResidual> sampled_statics_;  ///< Of each point, and memory for more.
   std::vector<VecX> states_;                        ///< Of the keyframes, at each linearization.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "sovo/vo/plain_product.h"
 
@@ -209,8 +210,34 @@ void Window::apply_similarity(double scale) {
   update_geometry();
 }
 
-void Window::hold_oldest(const SE3& T_world_camera) {
-  const SE3 move = keyframes_.front()->T_world_camera() * T_world_camera.inverse();
+std::vector<SE3> Window::poses() const {
+  std::vector<SE3> out;
+  out.reserve(keyframes_.size());
+  for (const auto& k : keyframes_) out.push_back(k->T_world_camera());
+  return out;
+}
+
+int Window::steadiest(const std::vector<SE3>& T_world_camera) const {
+  const std::vector<SE3> now = poses();
+  const std::size_t older = std::max<std::size_t>(now.size(), 1) - 1;
+  std::size_t out = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t held = 0; held < older; ++held) {
+    const SE3 move = T_world_camera[held] * now[held].inverse();
+    double moved = 0.0;
+    for (std::size_t i = 0; i < older; ++i) {
+      const Vec3 way = (move * now[i]).translation() - T_world_camera[i].translation();
+      moved += std::sqrt(way.norm());  // one that went far is one that moved, no more
+    }
+    if (moved >= least) continue;
+    least = moved;
+    out = held;
+  }
+  return static_cast<int>(out);
+}
+
+void Window::hold(int index, const SE3& T_world_camera) {
+  const SE3 move = (*this)[index].T_world_camera() * T_world_camera.inverse();
   for (auto& k : keyframes_) {
     k->frozen_T_camera_world = k->frozen_T_camera_world * move;
     k->T_camera_world = k->T_camera_world * move;

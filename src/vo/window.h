@@ -200,9 +200,16 @@ class Window {
   /// its displacement. The photometric energy does not change.
   void apply_similarity(double scale);
 
-  /// Moves the world, poses and linearization points alike, so that the oldest keyframe is at
+  /// Moves the world, poses and linearization points alike, so that keyframe `index` is at
   /// `T_world_camera`. What keyframes see of each other, and the prior, stay as they are.
-  void hold_oldest(const SE3& T_world_camera);
+  void hold(int index, const SE3& T_world_camera);
+
+  /// Of all keyframes but the newest, the one against which the others have moved least since they
+  /// were at `T_world_camera`, however far single ones went. Of a window of one, that.
+  int steadiest(const std::vector<SE3>& T_world_camera) const;
+
+  /// T_world_camera of all keyframes.
+  std::vector<SE3> poses() const;
 
  private:
   void renumber();

@@ -139,19 +139,24 @@ TEST(BundleAdjustment, ConvergesToTheTruthUpToScale) {
   EXPECT_LT(errors[errors.size() * 9 / 10], 0.04);
 }
 
-TEST(BundleAdjustment, OldestKeyframeStaysWhereItWas) {
+TEST(BundleAdjustment, AnOlderKeyframeStaysWhereItWas) {
   Window window = scene_window(kKeyframes, 6, 1);  // the map's first keyframe has left
   Vec8 x = Vec8::Zero();
   x.head<3>() = Vec3(0.02, -0.03, 0.01);
   window.newest().set_x(x);
   window.newest().freeze();
   window.update_geometry();
-  const SE3 oldest = window[0].T_world_camera();
-  const SE3 tracked = window.newest().T_world_camera();
+  const std::vector<SE3> before = window.poses();
   WorkerPool pool(1);
   BundleAdjuster(WindowConfig(), &pool).optimize(&window);
-  EXPECT_LT((window[0].T_world_camera().inverse() * oldest).log().norm(), 1e-12);
-  EXPECT_GT((window.newest().T_world_camera().inverse() * tracked).log().norm(), 0.02);
+  std::vector<double> moved;
+  for (int i = 0; i < window.size(); ++i) {
+    const SE3& T_camera_world = window[i].T_camera_world;
+    moved.push_back((T_camera_world * before[static_cast<std::size_t>(i)]).log().norm());
+  }
+  EXPECT_LT(*std::min_element(moved.begin(), moved.end() - 1), 1e-12);
+  EXPECT_LT(*std::max_element(moved.begin(), moved.end() - 1), 0.01);
+  EXPECT_GT(moved.back(), 0.02);
 }
 
 /// Two keyframes of a camera that has moved by `step` [m] along x, the second one blurred by more;

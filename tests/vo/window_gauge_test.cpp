@@ -206,7 +206,7 @@ TEST_P(Similarity, LeavesEnergyPriorAndStepUnchanged) {
 
 INSTANTIATE_TEST_SUITE_P(Scales, Similarity, ::testing::Values(0.2, 0.97, 1.05, 7.0));
 
-TEST_F(WindowGauge, HoldingTheOldestKeyframeMovesTheWorldAlone) {
+TEST_F(WindowGauge, HoldingAKeyframeMovesTheWorldAlone) {
   displace(1.0, 7, &window_);
   set_random_prior(8, &window_);
   const NormalEquations before = linearized_system();
@@ -216,7 +216,7 @@ TEST_F(WindowGauge, HoldingTheOldestKeyframeMovesTheWorldAlone) {
   const SE3 T_newest_oldest = window_.newest().T_camera_world * window_[0].T_world_camera();
 
   const SE3 place(SO3::exp(Vec3(0.3, -0.2, 0.5)), Vec3(4.0, -3.0, 2.0));
-  window_.hold_oldest(place);
+  window_.hold(0, place);
   EXPECT_LT((window_[0].T_world_camera().inverse() * place).log().norm(), 1e-12);
   const SE3 seen = window_.newest().T_camera_world * window_[0].T_world_camera();
   EXPECT_LT((seen.inverse() * T_newest_oldest).log().norm(), 1e-12);
@@ -229,6 +229,26 @@ TEST_F(WindowGauge, HoldingTheOldestKeyframeMovesTheWorldAlone) {
       relative_difference(units.cwiseProduct(adjuster_.solve(window_, after, 1e-4, true)).eval(),
                           units.cwiseProduct(step).eval()),
       2e-3);
+}
+
+TEST_F(WindowGauge, TheSteadiestKeyframeIsOneThatTheOthersStayWith) {
+  ASSERT_GE(window_.size(), 4);
+  const std::vector<SE3> before = window_.poses();
+  const auto moved = [](double size) {
+    Vec8 x = Vec8::Zero();
+    x.head<3>() = size * Vec3(1.0, -2.0, 0.5);
+    return x;
+  };
+  window_[0].set_x(moved(0.3));
+  window_.newest().set_x(moved(2.0));
+  // The whole world moved along changes nothing.
+  window_.hold(1, SE3(SO3::exp(Vec3(0.3, -0.2, 0.5)), Vec3(4.0, -3.0, 2.0)));
+  const int held = window_.steadiest(before);
+  window_.hold(held, before[static_cast<std::size_t>(held)]);
+  for (int i = 1; i + 1 < window_.size(); ++i) {
+    const SE3 off = window_[i].T_world_camera() * before[static_cast<std::size_t>(i)].inverse();
+    EXPECT_LT(off.log().norm(), 1e-9) << i;
+  }
 }
 
 TEST_F(WindowGauge, SimilarityScalesImmatureIntervals) {

@@ -219,7 +219,7 @@ class Robustness(SimTest):
         # frame or two.
         for part in (("--frames", 90), ("--trajectory", "slip", "--reverse", "--frames", 90)):
             truth, live = self.fly("highway", *part, "--set", "sim.traffic=busy", calibration=())
-            self.expect_whole(truth, live, 6.0)
+            self.expect_whole(truth, live, 4.0)
 
     def test_rest_then_motion_then_rest(self):
         seconds = 63.0 if LONG else 8.0

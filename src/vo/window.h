@@ -204,8 +204,9 @@ class Window {
   /// `T_world_camera`. What keyframes see of each other, and the prior, stay as they are.
   void hold(int index, const SE3& T_world_camera);
 
-  /// Of all keyframes but the newest, the one against which the others have moved least since they
-  /// were at `T_world_camera`, however far single ones went. Of a window of one, that.
+  /// Index of the one of all keyframes but the newest against which the others have moved least
+  /// since they were at `T_world_camera` (one a keyframe, by index), however far single ones went.
+  /// Of a window of one, that.
   int steadiest(const std::vector<SE3>& T_world_camera) const;
 
   /// T_world_camera of all keyframes.

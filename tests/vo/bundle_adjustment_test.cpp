@@ -159,6 +159,23 @@ TEST(BundleAdjustment, AnOlderKeyframeStaysWhereItWas) {
   EXPECT_GT(moved.back(), 0.02);
 }
 
+TEST(BundleAdjustment, TheWorldDoesNotShakeWithItsOldestKeyframe) {
+  Window window = scene_window(kKeyframes, 6, 1);
+  Vec8 x = Vec8::Zero();
+  x.head<3>() = Vec3(0.02, -0.03, 0.01);
+  window[0].set_x(x);
+  window[0].freeze();
+  window.update_geometry();
+  const std::vector<SE3> before = window.poses();
+  WorkerPool pool(1);
+  BundleAdjuster(WindowConfig(), &pool).optimize(&window);
+  const auto moved = [&](int i) {
+    return (window[i].T_camera_world * before[static_cast<std::size_t>(i)]).log().norm();
+  };
+  EXPECT_GT(moved(0), 0.02) << "it is put back";
+  for (int i = 1; i + 1 < window.size(); ++i) EXPECT_LT(moved(i), 0.01) << i;
+}
+
 /// Two keyframes of a camera that has moved by `step` [m] along x, the second one blurred by more;
 /// depths are true, and each has a stereo match with this deviation of the log-depth.
 Window two_keyframes(double step, double relative_sigma) {

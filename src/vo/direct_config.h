@@ -103,6 +103,7 @@ struct PointConfig {
   double max_interval_px = 8.0;   ///< Search interval at activation.
   double min_interval_px = 1.5;   ///< Below, a point is not traced any more.
   double stereo_interval_sigmas = 3.0;  ///< Half width of the interval that a static match sets.
+  bool surface_slopes = true;           ///< Patterns follow the slope of what they lie on.
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -115,6 +116,8 @@ struct PointConfig {
     v("max_interval_px", max_interval_px, "search interval at activation, at most [px]");
     v("min_interval_px", min_interval_px, "search interval below which tracing stops [px]");
     v("stereo_interval_sigmas", stereo_interval_sigmas, "half width of a static match's interval");
+    v("surface_slopes", surface_slopes,
+      "patterns of pixels that stereo knows follow the slope of ground and walls around them");
   }
 };
 

@@ -4,8 +4,10 @@
 #include <cmath>
 #include <utility>
 
+#include "sovo/vo/depth_sigma.h"
 #include "sovo/vo/epipolar_search.h"
 #include "sovo/vo/keyframe_policy.h"
+#include "sovo/vo/keyframe_slopes.h"
 #include "sovo/vo/marginalization.h"
 #include "sovo/vo/stage_timer.h"
 #include "sovo/vo/static_residual.h"
@@ -16,8 +18,6 @@ namespace sovo {
 
 namespace {
 
-/// Noise of one pixel of a residual, from which depth information follows [grey levels].
-constexpr double kPixelNoise = 5.0;
 constexpr double kMaxBundleRmse = 30.0;
 
 PixelSelectorConfig selector_config(PixelSelectorConfig config, int seed) {
@@ -42,25 +42,11 @@ std::unique_ptr<Keyframe> new_keyframe(std::uint32_t id, const MonoFrame& frame,
   return k;
 }
 
-/// Standard deviation of a point's inverse depth; 0 when that says nothing about its depth.
-double known_sigma(const Point& p, double rho_unit) {
-  const double information = depth_information(p, rho_unit);
-  if (information <= 0.0) return 0.0;
-  // Pattern pixels are correlated: half of them count.
-  const double sigma = kPixelNoise * std::sqrt(2.0 / information);
-  return sigma > kMaxRelativeSigma * p.rho ? 0.0 : sigma;
-}
-
 /// And the points that stereo found in the newest keyframe.
 std::vector<SeenPoint> with_matched(std::vector<SeenPoint> seen, const Window& window) {
   const std::vector<SeenPoint> matched = matched_points(window);
   seen.insert(seen.end(), matched.begin(), matched.end());
   return seen;
-}
-
-/// The same as `Point::hessian` that a match's deviation stands for.
-double information_of(const DepthProposal& depth) {
-  return std::pow(kPixelNoise / std::max(depth.sigma, 1e-6F), 2);
 }
 
 /// Narrows an immature point's interval to a proposed depth.
@@ -69,7 +55,7 @@ void set_interval(const DepthProposal& depth, double sigmas, ImmaturePoint* p) {
   const auto half = static_cast<float>(sigmas) * depth.sigma;
   p->rho_min = std::max(depth.rho - half, 0.0F);
   p->rho_max = depth.rho + half;
-  p->static_information = static_cast<float>(information_of(depth));
+  p->static_information = static_cast<float>(information_of_sigma(depth.sigma));
 }
 
 Point start_point(const ImmaturePoint& immature, const DepthProposal& depth) {
@@ -80,7 +66,7 @@ Point start_point(const ImmaturePoint& immature, const DepthProposal& depth) {
   p.colour = immature.colour;
   p.weight = immature.weight;
   p.rho = std::max(depth.rho, 1e-5F);
-  p.hessian = information_of(depth);
+  p.hessian = information_of_sigma(depth.sigma);
   p.static_information = static_cast<float>(p.hessian);
   p.last_state = ResidualState::kIn;
   return p;
@@ -386,6 +372,9 @@ void DirectOdometry::add_immature_points(const DepthProposer& proposer, const Ma
     set_interval(proposals[i], config_.points.stereo_interval_sigmas, &p);
     k.immature.push_back(p);
   }
+  if (!config_.points.surface_slopes) return;
+  const StageTimer t(timer, MapStage::kStaticMatching);
+  find_slopes(&window_);
 }
 
 void DirectOdometry::set_right_image(const ImagePyramidPtr& right, Keyframe* keyframe) {

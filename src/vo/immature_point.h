@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "sovo/vo/pattern.h"
+#include "sovo/vo/surface_slope.h"
 
 namespace sovo {
 
@@ -35,6 +36,7 @@ struct ImmaturePoint {
   /// On rho, of the stereo match that gave the interval, as `Point::static_information`; 0: there
   /// was none [m^2].
   float static_information = 0.0F;
+  SurfaceSlope slope;
 
   bool from_static_match() const { return static_information > 0.0F; }
 };

@@ -71,11 +71,24 @@ PairRowShift::Displacement row_shift(const PairGeometry& g, const Point& point,
   return g.rows.at(point.v, std::clamp(row, 0.0F, static_cast<float>(height)));
 }
 
-PatternWarp pattern_warp(const PairGeometry& g, const ImageF& image,
-                         const Eigen::Vector3f& centre) {
+/// How far a pattern's pixels move in the target, not yet divided by z, for inverse depth.
+Eigen::Vector3f depth_motion(const CameraModel& camera, const PairGeometry& g,
+                             const PairRowShift::Displacement& rows) {
+  if (g.rows.none()) return g.Kt;
+  const Eigen::Matrix3f K = camera.matrix().cast<float>();
+  return plain_product(K, rows.applied(g.t));
+}
+
+/// The homography of the plane that the point lies on: to that of an upright one its slope adds
+/// K t (d rho / d pixel)^T.
+PatternWarp pattern_warp(const PairGeometry& g, const ImageF& image, const Point& point,
+                         const Eigen::Vector3f& Kt, const Eigen::Vector3f& centre) {
+  const auto rho = static_cast<float>(point.rho);
+  const Eigen::Vector3f along_x = g.KRKi.col(0) + Kt * (rho * point.slope.u);
+  const Eigen::Vector3f along_y = g.KRKi.col(1) + Kt * (rho * point.slope.v);
   return {{centre.x(), centre.y(), centre.z()},
-          {g.KRKi(0, 0), g.KRKi(1, 0), g.KRKi(2, 0)},
-          {g.KRKi(0, 1), g.KRKi(1, 1), g.KRKi(2, 1)},
+          {along_x.x(), along_x.y(), along_x.z()},
+          {along_y.x(), along_y.y(), along_y.z()},
           image.width(),
           image.height()};
 }
@@ -137,8 +150,9 @@ bool sum_blurred_pattern(const Window& window, int host, int target,
                          LinearizedResidual* out) {
   const ImageF& image = window[target].image();
   const float z = at.rho / at.centre_rho;
-  const PatternWarp warp =
-      pattern_warp(window.pair(host, target), image, {at.centre_u * z, at.centre_v * z, z});
+  const PairGeometry& g = window.pair(host, target);
+  const PatternWarp warp = pattern_warp(g, image, point, depth_motion(window.camera(), g, at.rows),
+                                        {at.centre_u * z, at.centre_v * z, z});
   if (!blur->known) *blur = pattern_blur(window, host, target, point, at, warp);
   if (!blur->in_host && blur->in_target.places == 1) return false;
 
@@ -166,20 +180,19 @@ void project_pattern(const Window& window, int host, int target, const Point& po
   out.rho = static_cast<float>(point.rho);
   const Eigen::Vector3f ray(point.u, point.v, 1.0F);
   const Eigen::Vector3f turned = plain_product(g.KRKi, ray);
-  Eigen::Vector3f centre = turned + g.Kt * out.rho;
   Eigen::Vector3f frozen_t = g.frozen_t;
   if (!g.rows.none()) {
-    out.rows = row_shift(g, point, centre, image.height());
-    const Eigen::Matrix3f K = window.camera().matrix().cast<float>();
-    centre = turned + plain_product(K, out.rows.applied(g.t)) * out.rho;
+    out.rows = row_shift(g, point, turned + g.Kt * out.rho, image.height());
     frozen_t = out.rows.applied(g.frozen_t);
   }
+  const Eigen::Vector3f Kt = depth_motion(window.camera(), g, out.rows);
+  const Eigen::Vector3f centre = turned + Kt * out.rho;
   const Eigen::Vector3f frozen = plain_product(g.frozen_RKi, ray) + frozen_t * out.rho;
   out.iz = 1.0F / frozen.z();
   out.x = frozen.x() * out.iz;
   out.y = frozen.y() * out.iz;
 
-  const PatternWarp warp = pattern_warp(g, image, centre);
+  const PatternWarp warp = pattern_warp(g, image, point, Kt, centre);
   const bool inside =
       run_kernel<PlacePattern>(warp, out.fx.data(), out.fy.data(), out.offset.data());
   const float iz = 1.0F / centre.z();

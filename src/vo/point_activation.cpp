@@ -197,6 +197,7 @@ void PointActivator::optimize(const Window& window, double mean_rho, Candidate* 
   p.type = immature.type;
   p.rho = std::max(0.5 * (static_cast<double>(immature.rho_min) + immature.rho_max), 1e-6);
   p.static_information = immature.static_information;
+  p.slope = immature.slope;
 
   CandidateBlur blur;
   DepthEvaluation now;

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <vector>
+
 #include "vo/drive_test_support.h"
 
 namespace sovo {
@@ -143,6 +146,46 @@ TEST_F(Map, PixelsWithoutDepthTellOfWeakTextureToo) {
   ASSERT_GT(with_depth, 50);
   vo_.begin(frame, SE3(), points, nullptr);
   EXPECT_LT(vo_.tracking_reference()->threshold_share, 1.0);
+}
+
+/// How many of the newest keyframe's pixels have a slope, once stereo knows the depths of all.
+int pixels_with_slope(bool surface_slopes) {
+  const SyntheticScene scene(3);
+  DirectConfig config = small_config();
+  config.points.surface_slopes = surface_slopes;
+  WorkerPool pool(1);
+  DirectOdometry vo(config, small_camera(), ImageU8(), 0, &pool);
+  SE3 pose;
+  KeyframeStereo stereo;
+  stereo.depths = [&](const std::vector<SelectedPixel>& pixels,
+                      std::vector<DepthProposal>* proposals) {
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      const double depth = scene.depth(small_camera(), pose, Vec2(pixels[i].x, pixels[i].y));
+      (*proposals)[i] = {static_cast<float>(1.0 / depth), static_cast<float>(0.01 / depth)};
+    }
+  };
+  const MonoFrame first = frame_at(scene, pose, 0);
+  const std::vector<SelectedPixel> pixels = vo.select_pixels(first, 700);
+  std::vector<DepthProposal> depths(pixels.size());
+  stereo.depths(pixels, &depths);
+  std::vector<StartPoint> points;
+  for (std::size_t i = 0; i < pixels.size(); ++i) points.push_back({pixels[i], depths[i]});
+  vo.begin(first, pose, points, nullptr);
+  for (int i = 1; vo.window().size() < 3 && i < 40; ++i) {
+    pose = drive(i);
+    vo.map(vo.track(frame_at(scene, pose, i), 0.0), stereo, nullptr);
+  }
+  EXPECT_EQ(vo.window().size(), 3);
+  const std::vector<ImmaturePoint>& newest = vo.window().newest().immature;
+  EXPECT_GT(newest.size(), 100U);
+  return static_cast<int>(std::count_if(newest.begin(), newest.end(), [](const ImmaturePoint& p) {
+    return p.slope.u != 0.0F || p.slope.v != 0.0F;
+  }));
+}
+
+TEST(NewKeyframe, ItsPixelsLearnTheSlopeOfWhatTheyLieOnWhereWanted) {
+  EXPECT_GT(pixels_with_slope(true), 100);
+  EXPECT_EQ(pixels_with_slope(false), 0);
 }
 
 TEST_F(Map, BeginsAnewWithoutWhatItHeld) {

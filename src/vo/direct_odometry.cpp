@@ -372,9 +372,7 @@ void DirectOdometry::add_immature_points(const DepthProposer& proposer, const Ma
     set_interval(proposals[i], config_.points.stereo_interval_sigmas, &p);
     k.immature.push_back(p);
   }
-  if (!config_.points.surface_slopes) return;
-  const StageTimer t(timer, MapStage::kStaticMatching);
-  find_slopes(&window_);
+  if (config_.points.surface_slopes) find_slopes(&window_);
 }
 
 void DirectOdometry::set_right_image(const ImagePyramidPtr& right, Keyframe* keyframe) {

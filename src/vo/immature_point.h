@@ -36,7 +36,7 @@ struct ImmaturePoint {
   /// On rho, of the stereo match that gave the interval, as `Point::static_information`; 0: there
   /// was none [m^2].
   float static_information = 0.0F;
-  SurfaceSlope slope;
+  SurfaceSlope slope;  ///< Of what it lies on; (0, 0): not known.
 
   bool from_static_match() const { return static_information > 0.0F; }
 };

@@ -1,5 +1,6 @@
 #include "sovo/vo/keyframe_slopes.h"
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -39,6 +40,10 @@ SurfaceSample matched_depth(const ImmaturePoint& p) {
 
 void find_slopes(Window* window) {
   Keyframe& keyframe = window->newest();
+  if (std::none_of(keyframe.immature.begin(), keyframe.immature.end(),
+                   [](const ImmaturePoint& p) { return p.from_static_match(); })) {
+    return;
+  }
   std::vector<SurfaceSample> known = seen_depths(*window);
   for (const ImmaturePoint& p : keyframe.immature) {
     if (p.from_static_match()) known.push_back(matched_depth(p));

@@ -9,14 +9,14 @@ namespace sovo {
 
 namespace {
 
-constexpr int kSlopeCell = 16;                ///< [px]
-constexpr float kReach = 24.0F;               ///< Neighbours lie no further away [px].
-constexpr std::size_t kFewestNeighbours = 6;  ///< Neighbours.
-constexpr std::size_t kExpectedNeighbours = 64;
-constexpr double kLeastOnPlane = 0.6;   ///< Of their weights, that must lie on the plane.
-constexpr double kSurface = 0.02;       ///< Of surfaces off their planes, over the depth.
-constexpr double kLikelySlope = 0.05;   ///< Prior's standard deviation [1/px].
-constexpr double kLargestSlope = 0.15;  ///< [1/px]
+constexpr int kSlopeCell = 16;                   ///< [px]
+constexpr float kReach = 24.0F;                  ///< Neighbours lie no further away [px].
+constexpr std::size_t kFewestNeighbours = 6;     ///< For three numbers.
+constexpr std::size_t kExpectedNeighbours = 64;  ///< Memory for so many is asked for at once.
+constexpr double kLeastOnPlane = 0.6;            ///< Of their weights, that must lie on the plane.
+constexpr double kSurface = 0.02;                ///< Of surfaces off their planes, over the depth.
+constexpr double kLikelySlope = 0.05;            ///< Prior's standard deviation [1/px].
+constexpr double kLargestSlope = 0.15;           ///< [1/px]
 constexpr int kPlaneIterations = 5;
 constexpr double kWidestDeviation = 8.0;     ///< Of deviations: where robust weights begin,
 constexpr double kNarrowestDeviation = 2.0;  ///< and where they end.

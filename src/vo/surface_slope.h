@@ -10,7 +10,7 @@ namespace sovo {
 struct SurfaceSample {
   float u = 0.0F, v = 0.0F;  ///< [px]
   float rho = 0.0F;          ///< [1/m]
-  float variance = 0.0F;     ///< Of rho over rho.
+  float variance = 0.0F;     ///< Of rho, over its square.
 };
 
 /// How inverse depth changes over the image at a point: by this share of it a pixel.
@@ -30,10 +30,11 @@ struct SlopeNeighbour {
 /// some twenty pixels, as ground and walls are.
 class SurfaceSlopes {
  public:
+  /// `width`, `height`: of the image [px]; `known`: places in it.
   SurfaceSlopes(int width, int height, std::vector<SurfaceSample> known);
 
-  /// Slope of the surface that `at` lies on; none where too few depths are known around it, or not
-  /// most of them lie on one plane with it.
+  /// Slope of the surface that `at` lies on; none (0, 0) where too few depths are known around it,
+  /// or not most of them lie on one plane with it.
   SurfaceSlope at(const SurfaceSample& at);
 
  private:

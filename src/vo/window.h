@@ -40,7 +40,7 @@ struct Point {
   std::array<float, kPatternSize> weight{};  ///< Gradient weights of the pattern.
   std::uint8_t type = 1;                     ///< Block size of the selection: 1, 2, 4.
   double rho = 0.0;                          ///< Inverse depth, current estimate [1/m].
-  SurfaceSlope slope;                        ///< Of what it lies on.
+  SurfaceSlope slope;                        ///< Of what it lies on; (0, 0): not known.
   double hessian = 0.0;             ///< H_rho_rho of the newest linearization, without priors.
   double gradient = 0.0;            ///< b_rho.
   float static_information = 0.0F;  ///< As `hessian`, of the match that gave rho first; 0: none.

@@ -61,6 +61,7 @@ Result<void> check_weights(const DirectConfig& vo) {
       {"keyframe.rmse_min_score", keyframe.rmse_min_score},
       {"window.folding_weight", window.folding_weight},
       {"window.depth_damping", window.depth_damping},
+      {"window.place_damping", window.place_damping},
       {"window.static_weight", window.static_weight},
       {"window.prior_a", window.prior_a},
       {"window.prior_b", window.prior_b}};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -32,24 +33,20 @@ MatX orthonormalized(MatX n) {
          values.tail(rank).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
-/// An estimate to come back to.
-struct Backup {
-  std::vector<Vec8> x;
-  std::vector<double> rho;
-
-  Backup(const Window& window, const std::vector<PointRef>& points) {
-    for (int i = 0; i < window.size(); ++i) x.push_back(window[i].x);
-    rho.reserve(points.size());
-    for (const PointRef& ref : points) rho.push_back(ref.point->rho);
-  }
-  void restore(Window* window, const std::vector<PointRef>& points) const {
-    for (int i = 0; i < window->size(); ++i) (*window)[i].set_x(x[static_cast<std::size_t>(i)]);
-    for (std::size_t i = 0; i < points.size(); ++i) points[i].point->rho = rho[i];
-    window->update_geometry();
-  }
-};
-
 }  // namespace
+
+void BundleAdjuster::Backup::take(const Window& window, const std::vector<PointRef>& points) {
+  x.clear();
+  rho.clear();
+  for (int i = 0; i < window.size(); ++i) x.push_back(window[i].x);
+  for (const PointRef& ref : points) rho.push_back(ref.point->rho);
+}
+
+void BundleAdjuster::Backup::restore(Window* window, const std::vector<PointRef>& points) const {
+  for (int i = 0; i < window->size(); ++i) (*window)[i].set_x(x[static_cast<std::size_t>(i)]);
+  for (std::size_t i = 0; i < points.size(); ++i) points[i].point->rho = rho[i];
+  window->update_geometry();
+}
 
 FramePrior frame_prior(const Keyframe& k, const WindowConfig& config) {
   FramePrior prior;
@@ -149,6 +146,10 @@ VecX BundleAdjuster::solve(const Window& window, const NormalEquations& system, 
   const VecX units = state_units(window);
   H = units.asDiagonal() * H * units.asDiagonal();
   b = units.cwiseProduct(b);
+  // Where the window holds little but sky in common with an old keyframe, its place is anywhere.
+  for (int i = 0; i < window.size(); ++i) {
+    H.diagonal().segment<3>(8 * i).array() += config_.place_damping;
+  }
   const VecX balance = (H.diagonal().array() + 10.0).sqrt().inverse();
   const MatX balanced = balance.asDiagonal() * H * balance.asDiagonal();
   VecX y = -balance.cwiseProduct(solve_symmetric(balanced, balance.cwiseProduct(b)));
@@ -199,36 +200,93 @@ void BundleAdjuster::drop_bad_residuals(Window* window) const {
   }
 }
 
-Mat6 BundleAdjuster::newest_covariance(const Window& window, const NormalEquations& system) const {
-  const int newest = window.size() - 1;
-  if (newest < 1) return Mat6::Zero();
-  const int before = newest - 1;
+MatX BundleAdjuster::covariance_beside(const Window& window, MatX H, int anchor,
+                                       const std::vector<Eigen::Index>& wanted) {
   const VecX units = state_units(window);
-  MatX H = units.asDiagonal() * reduced(window, system, 0.0).H * units.asDiagonal();
-  // The scale of the world about the keyframe before; the pose of that is left out below.
-  const Vec3 centre = window[before].T_world_camera().translation();
+  H = units.asDiagonal() * H * units.asDiagonal();
+  // The scale of the world about the anchor; the pose of that is left out below.
+  const Vec3 centre = window[anchor].T_world_camera().translation();
   VecX scale = VecX::Zero(H.rows());
-  for (int i = 0; i <= newest; ++i) {
-    scale.segment<3>(8 * i) = window[i].T_camera_world * centre;
+  for (int i = 0; i < window.size(); ++i) {
+    const Vec3 moved = window[i].T_camera_world * centre;
+    scale.segment<3>(8 * i) = moved.cwiseQuotient(units.segment<3>(8 * i));
   }
-  scale = units.cwiseInverse().cwiseProduct(scale);
-  if (scale.norm() > 0.0) {
-    const double held = H.diagonal().segment<8>(8 * newest).maxCoeff();
-    H += held * scale * scale.transpose() / scale.squaredNorm();
+  if (const double squared = scale.squaredNorm(); squared > 0.0) {
+    const double held = H.diagonal().segment<8>(8 * (window.size() - 1)).maxCoeff();
+    for (Eigen::Index i = 0; i < H.rows(); ++i) H.col(i) += held * scale[i] / squared * scale;
   }
   std::vector<Eigen::Index> free;
+  free.reserve(static_cast<std::size_t>(H.rows()));
   for (Eigen::Index i = 0; i < H.rows(); ++i) {
-    if (i < 8 * before || i >= 8 * before + 6) free.push_back(i);
+    if (i < 8 * anchor || i >= 8 * anchor + 6) free.push_back(i);
   }
-  const MatX A = H(free, free);
-  const Eigen::Index n = A.rows();
-  MatX columns = MatX::Zero(n, 6);  // of the newest pose: the last eight but its a and b
-  columns.block<6, 6>(n - 8, 0).setIdentity();
-  const Mat6 unit_free = solve_symmetric_columns(A, columns).block<6, 6>(n - 8, 0);
-  const Vec6 unit = units.segment<6>(8 * newest);
-  const Mat6 covariance = unit.asDiagonal() * unit_free * unit.asDiagonal();
+  const auto row = [&](Eigen::Index state) { return state < 8 * anchor ? state : state - 6; };
+  const auto n = static_cast<Eigen::Index>(wanted.size());
+  MatX columns = MatX::Zero(H.rows() - 6, n);
+  for (Eigen::Index k = 0; k < n; ++k) columns(row(wanted[static_cast<std::size_t>(k)]), k) = 1.0;
+  const MatX solved = solve_symmetric_columns(H(free, free), columns);
+  MatX out(n, n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Eigen::Index state = wanted[static_cast<std::size_t>(k)];
+    out.row(k) = units[state] * solved.row(row(state));
+  }
+  for (Eigen::Index k = 0; k < n; ++k) out.col(k) *= units[wanted[static_cast<std::size_t>(k)]];
+  return out;
+}
+
+Mat6 BundleAdjuster::newest_covariance(const Window& window, const NormalEquations& system) const {
+  return newest_covariance(window, reduced(window, system, 0.0).H);
+}
+
+std::vector<double> BundleAdjuster::place_information(const Window& window,
+                                                      const NormalEquations& system) const {
+  return place_information(window, reduced(window, system, 0.0).H);
+}
+
+Mat6 BundleAdjuster::newest_covariance(const Window& window, const MatX& H) {
+  const int newest = window.size() - 1;
+  if (newest < 1) return Mat6::Zero();
+  std::vector<Eigen::Index> pose(6);
+  std::iota(pose.begin(), pose.end(), Eigen::Index{8} * newest);
+  const Mat6 covariance = covariance_beside(window, H, newest - 1, pose);
   const bool usable = covariance.allFinite() && covariance.diagonal().minCoeff() > 0.0;
   return usable ? Mat6(0.5 * (covariance + covariance.transpose())) : Mat6(Mat6::Zero());
+}
+
+std::vector<double> BundleAdjuster::place_information(const Window& window, MatX H) const {
+  const int newest = window.size() - 1;
+  // That the first keyframe is the world tells nothing of where the newest one is from it.
+  const FramePrior first = frame_prior(window[0], config_);
+  H.diagonal().head<6>() -= first.weight.head<6>();
+  std::vector<Eigen::Index> places;
+  places.reserve(static_cast<std::size_t>(3 * newest));
+  for (Eigen::Index i = 0; i < newest; ++i) {
+    for (Eigen::Index k = 0; k < 3; ++k) places.push_back(8 * i + k);
+  }
+  const VecX variances = covariance_beside(window, std::move(H), newest, places).diagonal();
+  std::vector<double> out;
+  out.reserve(static_cast<std::size_t>(newest));
+  for (Eigen::Index i = 0; i < newest; ++i) {
+    const double variance = variances.segment<3>(3 * i).sum();
+    const bool usable = std::isfinite(variance) && variance > 0.0;
+    out.push_back(usable ? 1.0 / variance : 0.0);
+  }
+  return out;
+}
+
+void BundleAdjuster::hold_world(const std::vector<SE3>& before, const MatX& H,
+                                Window* window) const {
+  // A step without gauge moves all keyframes by their share of what the newest one needs: what
+  // tracking errs alike each time would drive the world along. The map's first keyframe is the
+  // world; later, little may be seen of the oldest one, and the world must not shake with it.
+  const int held = (*window)[0].id == 0 ? 0 : window->steadiest(before);
+  window->hold(held, before[static_cast<std::size_t>(held)]);
+  if (window->size() < 3) return;
+  // Old keyframes that share only what is far with the new ones go their own way, metres a step,
+  // and would take along what is published.
+  const int placed = window->steadiest_place(before, place_information(*window, H));
+  const SO3 turn = (*window)[placed].T_world_camera().rotation();
+  window->hold(placed, SE3(turn, before[static_cast<std::size_t>(placed)].translation()));
 }
 
 double BundleAdjuster::scale_information(const WindowLinearization& at,
@@ -254,7 +312,7 @@ NormalEquations BundleAdjuster::iterate(Window* window, BundleResult* result) {
       result->finite = false;
       return solved;
     }
-    const Backup backup(*window, problem_.points());
+    backup_.take(*window, problem_.points());
     const bool small = apply_step(dx, lambda, window);
     ++result->iterations;
     const bool converged = small && i + 1 >= config_.min_iterations;
@@ -268,7 +326,7 @@ NormalEquations BundleAdjuster::iterate(Window* window, BundleResult* result) {
       std::swap(now_, next_);
       lambda = std::max(config_.damping, lambda * 0.25);
     } else {
-      backup.restore(window, problem_.points());
+      backup_.restore(window, problem_.points());
       lambda *= 100.0;
     }
     if (last) break;
@@ -295,11 +353,8 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   if (!result.finite) return result;
 
   window->newest().freeze();
-  // A step without gauge moves all keyframes by their share of what the newest one needs: what
-  // tracking errs alike each time would drive the world along. The map's first keyframe is the
-  // world; later, little may be seen of the oldest one, and the world must not shake with it.
-  const int held = (*window)[0].id == 0 ? 0 : window->steadiest(before);
-  window->hold(held, before[static_cast<std::size_t>(held)]);
+  const MatX H = reduced(*window, solved, 0.0).H;
+  hold_world(before, H, window);
   update_outlier_threshold(now_, window);
   problem_.reclassify(&now_);
   problem_.write_back(now_);
@@ -314,7 +369,7 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   result.finite = std::isfinite(result.rmse);
   result.gradient_scatter = problem_.gradient_scatter(now_, static_cast<int>(newest));
   result.newest_covariance =
-      keyframe_variance(result.rmse, result.gradient_scatter) * newest_covariance(*window, solved);
+      keyframe_variance(result.rmse, result.gradient_scatter) * newest_covariance(*window, H);
   if (const double information = scale_information(now_, problem_.points()); information > 0.0) {
     // Static residuals weigh more than their noise would have it, and those of a keyframe share the
     // errors of its right image.

@@ -61,6 +61,10 @@ class BundleAdjuster {
   /// tell it.
   Mat6 newest_covariance(const Window& window, const NormalEquations& system) const;
 
+  /// What is known of the place of each keyframe but the newest, seen from that one: the inverse of
+  /// its total variance for residuals of unit noise and a known scale; 0 where nothing is.
+  std::vector<double> place_information(const Window& window, const NormalEquations& system) const;
+
   /// Orthonormal basis of the seven gauge directions (motion and scale of the world; of six where
   /// static residuals hold the scale) at the linearization points, in states divided by
   /// `state_units`.
@@ -81,6 +85,16 @@ class BundleAdjuster {
     VecX b;
   };
   ReducedSystem reduced(const Window& window, const NormalEquations& system, double lambda) const;
+  /// Covariance of the `wanted` states of a window whose reduced system has this H, as seen from
+  /// the keyframe `anchor`, of which only its brightness may be among them, and for a known scale.
+  static MatX covariance_beside(const Window& window, MatX H, int anchor,
+                                const std::vector<Eigen::Index>& wanted);
+  // The two above of a reduced system that has this H.
+  static Mat6 newest_covariance(const Window& window, const MatX& H);
+  std::vector<double> place_information(const Window& window, MatX H) const;
+  /// Takes back what steps moved the whole world by. `before`: T_world_camera of all keyframes;
+  /// `H`: of the last reduced system.
+  void hold_world(const std::vector<SE3>& before, const MatX& H, Window* window) const;
   /// Sets the newest keyframe's outlier threshold from the energies of the residuals into it.
   void update_outlier_threshold(const WindowLinearization& linearized, Window* window) const;
   /// Applies the step to poses and, by back-substitution, to depths. True when all are small.
@@ -93,10 +107,19 @@ class BundleAdjuster {
   static double scale_information(const WindowLinearization& at,
                                   const std::vector<PointRef>& points);
 
+  /// An estimate to come back to.
+  struct Backup {
+    std::vector<Vec8> x;
+    std::vector<double> rho;
+    void take(const Window& window, const std::vector<PointRef>& points);
+    void restore(Window* window, const std::vector<PointRef>& points) const;
+  };
+
   WindowConfig config_;
   // For their memory alone: each bundle adjustment begins anew.
   PhotometricProblem problem_;
   WindowLinearization now_, next_;
+  Backup backup_;
 };
 
 }  // namespace sovo

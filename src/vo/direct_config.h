@@ -131,6 +131,7 @@ struct WindowConfig {
   double folding_weight = 0.5;  ///< Of marginalized points' Hessians: pattern pixels correlate.
   double damping = 1e-5;
   double depth_damping = 100.0;            ///< Added to H_rho * mean_rho^2 of every point.
+  double place_damping = 1e5;              ///< Added to H of every place, by half the mean depth.
   double min_parallax = 2.0;               ///< Below it stereo depths stand against steps [px].
   double stop_threshold = 1.2;             ///< Times the step norms below which iteration stops.
   double resample_px = 0.01;               ///< Motion of a pattern above which it is sampled anew.
@@ -151,6 +152,10 @@ struct WindowConfig {
     v("damping", damping, "smallest Levenberg-Marquardt damping");
     v("depth_damping", depth_damping,
       "added to the information on a point's log-depth: what no parallax shows stays as it is");
+    v("place_damping", place_damping,
+      "added to the information on a keyframe's place, in half mean depths: one that hardly "
+      "anything "
+      "places stays");
     v("min_parallax", min_parallax,
       "with less, what a stereo match tells of a point's depth damps its steps [px]");
     v("stop_threshold", stop_threshold, "iteration stops below this x the step thresholds");

@@ -88,7 +88,7 @@ class DirectOdometry final : public MonocularBackend {
                                 std::span<const SE3> hypotheses,
                                 const std::optional<SE3>& expected);
   /// From the likely motions, and where that leads elsewhere than the motion did, from there on the
-  /// finest levels alone.
+  /// finest levels alone. Of poses that fit alike it is the one that asks for less acceleration.
   TrackingResult track_likely(const TrackingReference& reference, const MonoFrame& frame,
                               const KnownMotion& known);
   /// From the likely motions, and when none fits as expected, from those of a camera that was

@@ -54,6 +54,16 @@ bool is_nearly(const SE3& a, const SE3& b, double mean_rho) {
          difference.translation().norm() * mean_rho < kShift;
 }
 
+/// Whether a pose is likelier than another by its residuals and by what the motion would take.
+bool is_likelier(const TrackingReference& reference, const KnownMotion& known,
+                 const TrackingResult& pose, const TrackingResult& than) {
+  const double variance =
+      frame_variance(std::min(pose.rmse, than.rmse), reference.gradient_scatter);
+  const auto points = static_cast<double>(reference.levels[0].size());
+  return improbability(known, pose, points / variance) <
+         improbability(known, than, points / variance);
+}
+
 Mat6 covariance_of(const TrackingResult& tracking, double gradient_scatter) {
   const double variance = frame_variance(tracking.rmse, gradient_scatter);
   const Mat6 information = tracking.information / variance + 1e-6 * Mat6::Identity();
@@ -96,13 +106,19 @@ TrackingResult DirectOdometry::track_from_any(const TrackingReference& reference
 TrackingResult DirectOdometry::track_likely(const TrackingReference& reference,
                                             const MonoFrame& frame, const KnownMotion& known) {
   TrackingResult out = track_from_any(reference, frame, hypotheses_, known.expected);
-  if (is_nearly(out.T_current_reference, known.expected, reference.mean_rho)) return out;
   LastTracking last = last_tracking_;
   last.expected = known.expected;
-  const TrackingResult refined = tracker_.refine(reference, *frame.pyramid, frame.exposure_s,
-                                                 last_affine_, known.expected, last);
-  const bool reached = refined.good && is_reachable(known, refined.T_current_reference);
-  return reached && (!out.good || refined.rmse < out.rmse) ? refined : out;
+  const auto refine_from = [&](const SE3& start) {
+    const TrackingResult refined =
+        tracker_.refine(reference, *frame.pyramid, frame.exposure_s, last_affine_, start, last);
+    const bool reached = refined.good && is_reachable(known, refined.T_current_reference);
+    if (reached && (!out.good || is_likelier(reference, known, refined, out))) out = refined;
+  };
+  const SE3 found = out.T_current_reference;
+  if (!is_nearly(found, known.expected, reference.mean_rho)) refine_from(known.expected);
+  // Far points tell how the camera turned, and hardly where it is.
+  if (out.inliers > 0 && deviation(known, found) > 1.0) refine_from(expected_place(known, found));
+  return out;
 }
 
 TrackingResult DirectOdometry::align(const TrackingReference& reference, const MonoFrame& frame) {

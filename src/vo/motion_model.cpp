@@ -10,13 +10,35 @@ double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
   return 1e-9 * static_cast<double>(to_ns - from_ns);
 }
 
+SE3 expected_place(const KnownMotion& known, const SE3& found) {
+  const Vec3 place = known.expected.inverse().translation();
+  return {found.rotation(), -(found.rotation() * place)};
+}
+
+double improbability(const KnownMotion& known, const FrameTracking& pose, double information) {
+  return information * pose.rmse * pose.rmse +
+         std::pow(deviation(known, pose.T_current_reference), 2);
+}
+
 SE3 scaled_motion(const SE3& motion, double factor) { return SE3::exp(factor * motion.log()); }
 
 SE3 KnownMotion::after(double steps_since) const { return scaled_motion(step, steps_since) * last; }
 
-bool is_reachable(const KnownMotion& known, const SE3& T_current_reference) {
+namespace {
+
+double way_off(const KnownMotion& known, const SE3& T_current_reference) {
   const Vec3 found = T_current_reference.inverse().translation();
-  return (found - known.expected.inverse().translation()).norm() <= known.reach;
+  return (found - known.expected.inverse().translation()).norm();
+}
+
+}  // namespace
+
+bool is_reachable(const KnownMotion& known, const SE3& T_current_reference) {
+  return way_off(known, T_current_reference) <= known.reach;
+}
+
+double deviation(const KnownMotion& known, const SE3& T_current_reference) {
+  return known.sigma > 0.0 ? way_off(known, T_current_reference) / known.sigma : 0.0;
 }
 
 void MotionModel::note(const ReferenceKeyframe& reference, const SE3& T_camera_reference,
@@ -84,8 +106,10 @@ MotionModel::Forecast MotionModel::forecast(const ReferenceKeyframe& reference,
     const double since = seconds_between(past_[1].stamp_ns, stamp_ns);
     // Stamps and poses err as well, which counts where frames are close in time.
     constexpr double kErrors = 0.02;  // of the mean depth
-    motion.reach =
-        0.5 * max_acceleration * std::abs(since * (since + before)) + kErrors / reference.mean_rho;
+    constexpr double kUsual = 0.1;    // of the greatest acceleration
+    const double greatest_way = 0.5 * max_acceleration * std::abs(since * (since + before));
+    motion.reach = greatest_way + kErrors / reference.mean_rho;
+    motion.sigma = kUsual * greatest_way;
   }
   out.known = motion;
   return out;

@@ -21,6 +21,8 @@ struct KnownMotion {
   /// How far from there it may be, at the greatest acceleration and with what stamps and poses err
   /// by [the map's unit of length]; infinite: not known.
   double reach = std::numeric_limits<double>::infinity();
+  /// Standard deviation of where it is by what vehicles do [the map's unit of length]; 0: unknown.
+  double sigma = 0.0;
 
   /// Where the step before leads in `steps` times its time.
   SE3 after(double steps_since) const;
@@ -28,6 +30,17 @@ struct KnownMotion {
 
 /// Whether a camera that was on its way can be where it was found.
 bool is_reachable(const KnownMotion& known, const SE3& T_current_reference);
+
+/// How far a camera was found from where it was expected, in `KnownMotion::sigma`; 0: unknown.
+double deviation(const KnownMotion& known, const SE3& T_current_reference);
+
+/// Where the camera was expected, but turned as it was found (T_current_reference).
+SE3 expected_place(const KnownMotion& known, const SE3& found);
+
+/// How little image and motion together speak for a pose: minus twice its log-likelihood, but for
+/// what is the same of all poses of a frame. `information`: pixels over the variance of their
+/// noise [1/grey level^2].
+double improbability(const KnownMotion& known, const FrameTracking& pose, double information);
 
 /// The same motion in `factor` times its time.
 SE3 scaled_motion(const SE3& motion, double factor);

@@ -236,6 +236,26 @@ int Window::steadiest(const std::vector<SE3>& T_world_camera) const {
   return static_cast<int>(out);
 }
 
+int Window::steadiest_place(const std::vector<SE3>& T_world_camera,
+                            const std::vector<double>& weights) const {
+  const auto way = [&](std::size_t i) -> Vec3 {
+    return (*this)[static_cast<int>(i)].T_world_camera().translation() -
+           T_world_camera[i].translation();
+  };
+  std::size_t out = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t held = 0; held < weights.size(); ++held) {
+    double moved = 0.0;
+    for (std::size_t i = 0; i < weights.size(); ++i) {
+      moved += weights[i] * std::sqrt((way(i) - way(held)).norm());
+    }
+    if (moved >= least) continue;
+    least = moved;
+    out = held;
+  }
+  return static_cast<int>(out);
+}
+
 void Window::hold(int index, const SE3& T_world_camera) {
   const SE3 move = (*this)[index].T_world_camera() * T_world_camera.inverse();
   for (auto& k : keyframes_) {

@@ -210,6 +210,11 @@ class Window {
   /// Of a window of one, that.
   int steadiest(const std::vector<SE3>& T_world_camera) const;
 
+  /// The same of places alone, each keyframe with its weight: the one that is to be held where it
+  /// was for those of great weight to stay. Weights are one a keyframe but the newest.
+  int steadiest_place(const std::vector<SE3>& T_world_camera,
+                      const std::vector<double>& weights) const;
+
   /// T_world_camera of all keyframes.
   std::vector<SE3> poses() const;
 

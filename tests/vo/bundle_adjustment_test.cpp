@@ -110,16 +110,18 @@ TEST(BundleAdjustment, ConvergesToTheTruthUpToScale) {
   EXPECT_LT(result.rmse, 2.5);
   EXPECT_GT(result.points, 300);
 
-  // The first keyframe is the world; the scale is free.
-  EXPECT_LT(SE3(window[0].T_world_camera().inverse() * keyframe_pose(0)).log().norm(), 1e-3);
+  // The first keyframe turns the world; the scale is free.
+  const SE3 T_first_world = window[0].T_camera_world;
+  EXPECT_LT(T_first_world.rotation().log().norm(), 1e-7);
+  const auto seen_from_first = [&](int i) { return T_first_world * window[i].T_world_camera(); };
   double scale = 0.0;
   for (int i = 1; i < window.size(); ++i) {
-    scale += window[i].T_world_camera().translation().norm() /
-             keyframe_pose(i).translation().norm() / (window.size() - 1);
+    scale += seen_from_first(i).translation().norm() / keyframe_pose(i).translation().norm() /
+             (window.size() - 1);
   }
   EXPECT_NEAR(scale, 1.0, 0.1);
   for (int i = 1; i < window.size(); ++i) {
-    const SE3 estimate = window[i].T_world_camera();
+    const SE3 estimate = seen_from_first(i);
     const Vec3 error = estimate.translation() / scale - keyframe_pose(i).translation();
     EXPECT_LT(error.norm(), 0.0015) << "keyframe " << i;
     const SE3 turn = estimate.inverse() * keyframe_pose(i);
@@ -150,10 +152,14 @@ TEST(BundleAdjustment, AnOlderKeyframeStaysWhereItWas) {
   WorkerPool pool(1);
   BundleAdjuster(WindowConfig(), &pool).optimize(&window);
   std::vector<double> moved;
+  std::vector<double> turned;
   for (int i = 0; i < window.size(); ++i) {
-    const SE3& T_camera_world = window[i].T_camera_world;
-    moved.push_back((T_camera_world * before[static_cast<std::size_t>(i)]).log().norm());
+    const SE3& T_world_camera = before[static_cast<std::size_t>(i)];
+    moved.push_back(
+        (window[i].T_world_camera().translation() - T_world_camera.translation()).norm());
+    turned.push_back((window[i].T_camera_world * T_world_camera).rotation().log().norm());
   }
+  EXPECT_LT(*std::min_element(turned.begin(), turned.end() - 1), 1e-12);
   EXPECT_LT(*std::min_element(moved.begin(), moved.end() - 1), 1e-12);
   EXPECT_LT(*std::max_element(moved.begin(), moved.end() - 1), 0.01);
   EXPECT_GT(moved.back(), 0.02);
@@ -173,7 +179,64 @@ TEST(BundleAdjustment, TheWorldDoesNotShakeWithItsOldestKeyframe) {
     return (window[i].T_camera_world * before[static_cast<std::size_t>(i)]).log().norm();
   };
   EXPECT_GT(moved(0), 0.02) << "it is put back";
-  for (int i = 1; i + 1 < window.size(); ++i) EXPECT_LT(moved(i), 0.01) << i;
+  for (int i = 1; i + 1 < window.size(); ++i) EXPECT_LT(moved(i), 0.015) << i;
+}
+
+/// What three old keyframes and two new ones share is but every `kept`th of their points.
+void loosen(int kept, Window* window) {
+  constexpr int kOld = 3;
+  int seen = 0;
+  for (int h = 0; h < window->size(); ++h) {
+    for (Point& p : (*window)[h].points) {
+      if (++seen % kept == 0) continue;
+      for (int t = 0; t < window->size(); ++t) {
+        if ((h < kOld) == (t < kOld)) continue;
+        p.residuals[static_cast<std::size_t>((*window)[t].slot)] = Residual();
+      }
+    }
+  }
+}
+
+TEST(BundleAdjustment, TheWorldDoesNotGoWithOldKeyframesThatHardlyAnythingLinks) {
+  for (const std::uint32_t first_id : {0U, 1U}) {
+    Window window = scene_window(kKeyframes, 6, first_id);
+    loosen(60, &window);
+    Vec8 x = Vec8::Zero();
+    x.head<3>() = Vec3(0.03, -0.02, 0.02);
+    for (int i = 3; i < kKeyframes; ++i) {
+      window[i].set_x(x);
+      window[i].freeze();
+    }
+    window.update_geometry();
+    const std::vector<SE3> before = window.poses();
+    WorkerPool pool(1);
+    BundleAdjuster(WindowConfig(), &pool).optimize(&window);
+    const auto moved = [&](int i) {
+      return (window[i].T_world_camera().translation() -
+              before[static_cast<std::size_t>(i)].translation())
+          .norm();
+    };
+    EXPECT_LT(moved(3), 1e-12);
+    EXPECT_LT(moved(4), 0.01);
+    for (int i = 0; i < 3; ++i) EXPECT_GT(moved(i), 0.02) << i;
+  }
+}
+
+TEST(BundleAdjustment, AKeyframeThatHardlyAnythingPlacesStays) {
+  const Window window = scene_window(3, 40, 1);
+  const VecX units = BundleAdjuster::state_units(window);
+  NormalEquations system;
+  system.top = MatX::Zero(24, 24);
+  system.schur = MatX::Zero(24, 24);
+  system.b_schur = VecX::Zero(24);
+  for (int i = 0; i < 24; ++i) system.top(i, i) = (i < 8 ? 1e3 : 1e9) / std::pow(units[i], 2);
+  system.b_top = -0.01 * system.top * units;  // an undamped step is 0.01 of each
+  WorkerPool pool(1);
+  const VecX step =
+      BundleAdjuster(WindowConfig(), &pool).solve(window, system, 0.0, false).cwiseQuotient(units);
+  EXPECT_LT(step.head<3>().cwiseAbs().maxCoeff(), 1e-4);
+  EXPECT_NEAR(step[3], 0.01, 1e-4) << "its rotation is not held";
+  for (int k = 8; k < 11; ++k) EXPECT_NEAR(step[k], 0.01, 1e-4);
 }
 
 /// Two keyframes of a camera that has moved by `step` [m] along x, the second one blurred by more;
@@ -293,7 +356,7 @@ TEST(BundleAdjustment, NewestKeyframeEndsAtItsLinearizationPoint) {
   BundleAdjuster(WindowConfig(), &pool).optimize(&window);
   EXPECT_TRUE(window.newest().x.isZero());
   EXPECT_FALSE(window[1].x.isZero());
-  EXPECT_LT((first_estimate().inverse() * before).log().norm(), 1e-9) << "first estimates stay";
+  EXPECT_LT((first_estimate().inverse() * before).log().norm(), 1e-8) << "first estimates stay";
 }
 
 TEST(FramePrior, HoldsTheFirstKeyframeAndPullsBrightnessToZero) {

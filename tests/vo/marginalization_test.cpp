@@ -113,7 +113,7 @@ class Marginalization : public ::testing::Test {
  protected:
   Marginalization() : pool_(1), window_(scene_window(4, 9, 10)) {
     config_.folding_weight = 1.0;
-    config_.depth_damping = 0.0;  // of steps, not of what is folded
+    config_.depth_damping = config_.place_damping = 0.0;  // of steps, not of what is folded
     window_[1].id = 0;
     set_random_prior(2, &window_);
     displace(0.7, 3, &window_);

@@ -96,5 +96,46 @@ TEST(MotionModel, AccelerationLimitsTheReach) {
   EXPECT_FALSE(is_reachable(*known, beside));
 }
 
+TEST(MotionModel, UsualAccelerationsAreATenthOfTheGreatest) {
+  const ReferenceKeyframe reference = reference_at(0, SE3());
+  MotionModel model;
+  model.note(reference, on_its_way(1.0), kFrame);
+  model.note(reference, on_its_way(2.0), 2 * kFrame);
+  const auto known = model.forecast(reference, 3 * kFrame, 100.0).known;
+  ASSERT_TRUE(known);
+  // 10 m/s^2 for as long as it takes from the middle of the step before to the new frame.
+  EXPECT_NEAR(known->sigma, 10.0 * 0.05 * 0.05, 1e-9);
+  const SE3 beside(known->expected.rotation(),
+                   known->expected.translation() + Vec3(0.0, 0.03, -0.04));
+  EXPECT_NEAR(deviation(*known, beside), 2.0, 1e-9);
+  EXPECT_NEAR(deviation(*known, SE3(SO3::exp(Vec3(0.1, 0.2, 0.3)), Vec3::Zero()) * beside), 2.0,
+              1e-9)
+      << "turns are free";
+  const SE3 there = expected_place(*known, SE3(SO3::exp(Vec3(0.1, 0.2, 0.3)), Vec3(5, 6, 7)));
+  EXPECT_NEAR(deviation(*known, there), 0.0, 1e-9);
+  EXPECT_LT((there.rotation().log() - Vec3(0.1, 0.2, 0.3)).norm(), 1e-12);
+  const auto without_metres = model.forecast(reference, 3 * kFrame, 0.0).known;
+  ASSERT_TRUE(without_metres);
+  EXPECT_EQ(deviation(*without_metres, beside), 0.0);
+}
+
+TEST(MotionModel, OfPosesThatFitAlikeTheOneThatNeedsNoAccelerationIsLikelier) {
+  const KnownMotion known{
+      .expected = SE3(SO3(), Vec3(0, 0, -2.0)), .last = {}, .step = {}, .sigma = 0.1};
+  FrameTracking as_expected;
+  as_expected.T_current_reference = known.expected;
+  as_expected.rmse = 3.3;
+  FrameTracking at_rest;
+  at_rest.rmse = 3.2;
+  // 500 pixels whose noise is as strong as their residuals, and of which four err alike.
+  const double information = 500.0 / (4.0 * 3.2 * 3.2);
+  EXPECT_LT(improbability(known, as_expected, information),
+            improbability(known, at_rest, information));
+  // A braking vehicle that the image shows clearly is believed.
+  as_expected.rmse = 7.0;
+  EXPECT_GT(improbability(known, as_expected, information),
+            improbability(known, at_rest, information));
+}
+
 }  // namespace
 }  // namespace sovo

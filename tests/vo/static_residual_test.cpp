@@ -227,7 +227,7 @@ TEST(StaticResidual, ToLeaveTheViewIsNoGain) {
 /// Eigenvalues, ascending, of the poses' part of the system after elimination of the depths.
 VecX pose_eigenvalues(Window* window) {
   WindowConfig config;
-  config.prior_a = config.prior_b = config.depth_damping = 0.0;
+  config.prior_a = config.prior_b = config.depth_damping = config.place_damping = 0.0;
   const NormalEquations system = linearized(config, window).system;
   const VecX units = BundleAdjuster::state_units(*window);
   const MatX H = units.asDiagonal() * (system.top - system.schur) * units.asDiagonal();

@@ -15,7 +15,7 @@ constexpr int kGaugeKeyframes = 5;
 
 WindowConfig without_priors() {
   WindowConfig config;
-  config.prior_a = config.prior_b = config.depth_damping = 0.0;
+  config.prior_a = config.prior_b = config.depth_damping = config.place_damping = 0.0;
   config.resample_px = 0.0;  // the window is moved and scaled under the problem
   return config;
 }
@@ -248,6 +248,59 @@ TEST_F(WindowGauge, TheSteadiestKeyframeIsOneThatTheOthersStayWith) {
   for (int i = 1; i + 1 < window_.size(); ++i) {
     const SE3 off = window_[i].T_world_camera() * before[static_cast<std::size_t>(i)].inverse();
     EXPECT_LT(off.log().norm(), 1e-9) << i;
+  }
+}
+
+TEST_F(WindowGauge, ThePlaceToHoldIsThatOfGreatWeight) {
+  ASSERT_EQ(window_.size(), 5);
+  const std::vector<SE3> before = window_.poses();
+  for (int i = 0; i < 3; ++i) {
+    Vec8 x = Vec8::Zero();
+    x.head<3>() = Vec3(0.3, 0.1, -0.2);
+    window_[i].set_x(x);
+  }
+  EXPECT_LT(window_.steadiest_place(before, {1.0, 1.0, 1.0, 1.0}), 3) << "most have moved";
+  EXPECT_EQ(window_.steadiest_place(before, {1.0, 1.0, 1.0, 4.0}), 3);
+  EXPECT_LT(window_.steadiest_place(before, {0.1, 4.0, 0.1, 4.0}), 3);
+}
+
+/// Total variance of a keyframe's place, from the whole system with the newest keyframe and the
+/// scale about it held by weights.
+double variance_of_place(const Window& window, const NormalEquations& system, int keyframe) {
+  constexpr double kHeld = 1e14;
+  const int newest = window.size() - 1;
+  MatX H = system.top - system.schur + window.prior().H;
+  H.diagonal().segment<6>(8 * newest).array() += kHeld;
+  VecX scale = VecX::Zero(H.rows());
+  const Vec3 centre = window[newest].T_world_camera().translation();
+  for (int i = 0; i < newest; ++i) {
+    scale.segment<3>(8 * i) = window[i].frozen_T_camera_world * centre;
+  }
+  H += kHeld * scale * scale.transpose();
+  const MatX covariance =
+      Eigen::SelfAdjointEigenSolver<MatX>(H).eigenvectors() *
+      Eigen::SelfAdjointEigenSolver<MatX>(H).eigenvalues().cwiseInverse().asDiagonal() *
+      Eigen::SelfAdjointEigenSolver<MatX>(H).eigenvectors().transpose();
+  return covariance.block<3, 3>(8 * keyframe, 8 * keyframe).trace();
+}
+
+TEST_F(WindowGauge, InformationOnPlacesIsThatOfTheWholeSystem) {
+  const NormalEquations system = linearized_system();
+  const std::vector<double> information = adjuster_.place_information(window_, system);
+  ASSERT_EQ(information.size(), 4U);
+  for (int i = 0; i < 4; ++i) {
+    const double expected = 1.0 / variance_of_place(window_, system, i);
+    EXPECT_NEAR(information[static_cast<std::size_t>(i)], expected, 0.02 * expected) << i;
+  }
+}
+
+TEST_F(WindowGauge, OfTheFirstKeyframeOnlyWhatIsSeenTellsItsPlace) {
+  Window first = scene_window(kGaugeKeyframes, 6, 0);
+  const NormalEquations system = linearized_system();
+  const std::vector<double> as_world = adjuster_.place_information(first, system);
+  const std::vector<double> later = adjuster_.place_information(window_, system);
+  for (std::size_t i = 0; i < later.size(); ++i) {
+    EXPECT_NEAR(as_world[i], later[i], 0.02 * later[i]) << i;
   }
 }
 

@@ -347,7 +347,11 @@ void add_dataset_options(ConfigOptions& options) {
 }
 
 void add_sim_options(ConfigOptions& options) {
-  options.value("--world", "sim.world", "What is rendered", "lawn|pool|street|hall")
+  std::string worlds;
+  for (const auto& [world, name] : enum_names(sim::World())) {
+    worlds += (worlds.empty() ? "" : "|") + std::string(name);
+  }
+  options.value("--world", "sim.world", "What is rendered", worlds)
       .value("--trajectory", "sim.trajectory",
              "One of the world's own, or a TUM, EuRoC or KITTI pose file", "NAME|FILE")
       .value("--truth", "output.truth", "Write the true trajectory (TUM)", "FILE");

@@ -1,5 +1,7 @@
 """How the command answers to what it is asked: help, configuration, wrong input."""
 
+import re
+
 import harness
 from harness import BAD_INPUT, DATASET, OK, ROOT, USAGE, CommandTest, sovo
 
@@ -14,6 +16,11 @@ class Help(CommandTest):
                 result = self.expect(sovo(*command, "--help"), OK)
                 self.assertIn("Usage: ", result.stdout)
                 self.assertIn("Exit codes: 0 ", result.stdout)
+
+    def test_help_names_every_world(self):
+        worlds = re.search(r"world: .*one of ([a-z|]+)", sovo("config").stdout).group(1)
+        self.assertIn("highway", worlds)
+        self.assertIn(f"--world {worlds}", self.expect(sovo("run", "--help"), OK).stdout)
 
     def test_version(self):
         self.assertRegex(self.expect(sovo("--version"), OK).stdout, r"^sovo \d+\.\d+\.\d+\n$")

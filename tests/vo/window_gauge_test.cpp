@@ -277,10 +277,9 @@ double variance_of_place(const Window& window, const NormalEquations& system, in
     scale.segment<3>(8 * i) = window[i].frozen_T_camera_world * centre;
   }
   H += kHeld * scale * scale.transpose();
-  const MatX covariance =
-      Eigen::SelfAdjointEigenSolver<MatX>(H).eigenvectors() *
-      Eigen::SelfAdjointEigenSolver<MatX>(H).eigenvalues().cwiseInverse().asDiagonal() *
-      Eigen::SelfAdjointEigenSolver<MatX>(H).eigenvectors().transpose();
+  const Eigen::SelfAdjointEigenSolver<MatX> eigen(H);
+  const MatX covariance = eigen.eigenvectors() * eigen.eigenvalues().cwiseInverse().asDiagonal() *
+                          eigen.eigenvectors().transpose();
   return covariance.block<3, 3>(8 * keyframe, 8 * keyframe).trace();
 }
 

@@ -127,9 +127,8 @@ struct StereoOdometryConfig {
     v("wait_for_mapping", wait_for_mapping, "wait for mapping instead of dropping frames");
     v("lost_frames", lost_frames, "frames in a row without a pose that begin a new segment");
     v("max_acceleration", max_acceleration,
-      "a pose that takes more since the frames before is none, and of poses that fit alike one "
-      "that "
-      "takes more than a tenth is unlikely [m/s^2]; 0: neither");
+      "a pose that takes more since the frames before is none, and of poses that fit alike "
+      "one that takes more than a tenth is unlikely [m/s^2]; 0: neither");
     v("exposure_motion", exposure_motion,
       "cameras that are not triggered together: the motion between the exposures is undone");
     v("readout_ms", readout_ms,

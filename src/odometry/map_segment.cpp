@@ -68,12 +68,11 @@ DepthProposal proposal_of(const StaticMatch& match) {
 }  // namespace
 
 MapSegment::MapSegment(const StereoOdometryConfig& config, const FramePreparation& preparation,
-                       std::uint32_t index, const SE3& T_odom_left_start, int halvings,
-                       const RightTurn& right_turn, WorkerPool* pool, StageObserver* observer)
+                       std::uint32_t index, int halvings, const RightTurn& right_turn,
+                       WorkerPool* pool, StageObserver* observer)
     : config_(config),
       preparation_(preparation),
       index_(index),
-      T_odom_left_start_(T_odom_left_start),
       halvings_(halvings),
       pool_(pool),
       observer_(observer),
@@ -82,23 +81,22 @@ MapSegment::MapSegment(const StereoOdometryConfig& config, const FramePreparatio
       readout_motion_(preparation),
       optimizer_(config.scale, rig()),
       filter_(config.filter),
-      assist_(config.assist) {
-  scale_path_.restart(T_odom_left_start.translation());
-}
+      assist_(config.assist) {}
 
-bool MapSegment::initialize(const MonoFrame& frame, const SideImage* right) {
+bool MapSegment::initialize(const MonoFrame& frame, const SideImage* right,
+                            const SE3& T_odom_left) {
   const bool only_stereo = config_.init == InitMethod::kStereo;
   const bool due = only_stereo || attempts_ % kStereoEvery == 0;
   ++attempts_;
   stereo_problem_.clear();
   if (config_.init != InitMethod::kTwoView && right != nullptr && due) {
-    if (initialize_from_stereo(frame, *right)) {
+    if (initialize_from_stereo(frame, *right, T_odom_left)) {
       two_view_initializer_.reset();
       two_view_first_.reset();
       return true;
     }
   }
-  if (!only_stereo) return initialize_from_two_views(frame, right);
+  if (!only_stereo) return initialize_from_two_views(frame, right, T_odom_left);
   if (right == nullptr) reason_ = "waiting for a right image to begin from stereo depth";
   return false;
 }
@@ -113,7 +111,8 @@ bool MapSegment::wants_halving() const {
   return !stereo_problem_.empty() && attempts_ > kStereoEvery;
 }
 
-bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage& right) {
+bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage& right,
+                                        const SE3& T_odom_left) {
   const std::vector<SelectedPixel> pixels = vo_->select_pixels(frame, vo_->wanted_points());
   const ImagePyramidPtr right_pyramid = prepare_right(right, frame);
   const std::vector<StaticMatch> matches =
@@ -143,6 +142,8 @@ bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage&
   }
   if (stereo()) vo_->use_static_residuals(right_.rig());
   const bool at_once = right.stamp_offset_ns == 0;
+  T_odom_left_start_ = T_odom_left;
+  scale_path_.restart(T_odom_left.translation());
   vo_->begin(frame, T_odom_left_start_, points, stereo() && at_once ? right_pyramid : nullptr);
   readout_motion_.begin(*vo_->reference());
   exposure_motion_.note(*vo_->reference(), SE3(), frame.stamp_ns);
@@ -163,7 +164,8 @@ bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage&
   return true;
 }
 
-bool MapSegment::initialize_from_two_views(const MonoFrame& frame, const SideImage* right) {
+bool MapSegment::initialize_from_two_views(const MonoFrame& frame, const SideImage* right,
+                                           const SE3& T_odom_left) {
   if (two_view_initializer_) {
     switch (two_view_initializer_->track(frame.stamp_ns, frame.pyramid)) {
       case TwoViewInitializer::Status::kReady:
@@ -181,6 +183,7 @@ bool MapSegment::initialize_from_two_views(const MonoFrame& frame, const SideIma
   two_view_selector_ = std::make_unique<PixelSelector>(selector);
   const ImageU8& mask = preparation_.left_mask(halvings_);
   two_view_first_ = frame;
+  T_odom_left_start_ = T_odom_left;
   if (!two_view_initializer_->set_first(frame.stamp_ns, frame.pyramid, rig().left,
                                         mask.empty() ? nullptr : &mask, two_view_selector_.get())) {
     reason_ = "beginning from two views: " + two_view_initializer_->reason();
@@ -200,6 +203,7 @@ bool MapSegment::finish_two_views(const MonoFrame& frame, const SideImage* right
     s.depth = {p.inverse_depth, std::max(p.sigma, 1e-3F * p.inverse_depth)};
     points.push_back(s);
   }
+  scale_path_.restart(T_odom_left_start_.translation());
   vo_->begin(*two_view_first_, T_odom_left_start_, points, nullptr);
   TrackedFrame second = vo_->track_from(frame, result.T_newest_first);
   const MonoFrame first_frame = *std::exchange(two_view_first_, std::nullopt);

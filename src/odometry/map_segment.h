@@ -71,16 +71,17 @@ class MapSegment {
  public:
   /// `right_turn`: what is known of it so far.
   MapSegment(const StereoOdometryConfig& config, const FramePreparation& preparation,
-             std::uint32_t index, const SE3& T_odom_left_start, int halvings,
-             const RightTurn& right_turn, WorkerPool* pool, StageObserver* observer);
+             std::uint32_t index, int halvings, const RightTurn& right_turn, WorkerPool* pool,
+             StageObserver* observer);
 
   std::uint32_t index() const { return index_; }
   int halvings() const { return halvings_; }
   bool initialized() const { return initialized_; }
 
-  /// Tries to begin the map with this frame; `right` may be null. Returns true when the map has
-  /// begun; `T_odom_left` is then this frame's pose. `reason()` tells what is missing.
-  bool initialize(const MonoFrame& frame, const SideImage* right);
+  /// Tries to begin the map with this frame, which is taken to be at `T_odom_left`; `right` may be
+  /// null. Returns true when the map has begun, with this frame or with one that was given before.
+  /// `reason()` tells what is missing.
+  bool initialize(const MonoFrame& frame, const SideImage* right, const SE3& T_odom_left);
   const std::string& reason() const { return reason_; }
   /// Whether stereo depth was sought in the last frame, and in those of some time before, in vain:
   /// smaller images may do.
@@ -88,7 +89,8 @@ class MapSegment {
   /// Why stereo depth did not do in the last frame; empty: it was not sought.
   const std::string& stereo_problem() const { return stereo_problem_; }
   /// Tries to begin the map with the stereo depth of this frame alone.
-  bool initialize_from_stereo(const MonoFrame& frame, const SideImage& right);
+  bool initialize_from_stereo(const MonoFrame& frame, const SideImage& right,
+                              const SE3& T_odom_left);
 
   /// Tracks a frame. The limit of acceleration counts once the map has metres.
   TrackedFrame track(const MonoFrame& frame);
@@ -123,7 +125,8 @@ class MapSegment {
   TrackedFrame noted(TrackedFrame tracked);
   /// The right image of a frame that becomes a keyframe.
   ImagePyramidPtr prepare_right(const SideImage& right, const MonoFrame& frame);
-  bool initialize_from_two_views(const MonoFrame& frame, const SideImage* right);
+  bool initialize_from_two_views(const MonoFrame& frame, const SideImage* right,
+                                 const SE3& T_odom_left);
   bool finish_two_views(const MonoFrame& frame, const SideImage* right);
   std::vector<StaticMatch> match_all(const StaticMatcher& matcher, const ImagePyramid& left,
                                      const ImagePyramid& right,
@@ -149,7 +152,7 @@ class MapSegment {
   const StereoOdometryConfig& config_;
   const FramePreparation& preparation_;
   std::uint32_t index_;
-  SE3 T_odom_left_start_;
+  SE3 T_odom_left_start_;  ///< Where the first keyframe is.
   int halvings_;
   WorkerPool* pool_;
   StageObserver* observer_;

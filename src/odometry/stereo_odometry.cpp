@@ -9,6 +9,8 @@
 #include <utility>
 
 #include "sovo/geometry/pose_covariance.h"
+#include "sovo/odometry/dead_reckoning.h"
+#include "sovo/odometry/frame_verdict.h"
 #include "sovo/odometry/live_threads.h"
 #include "sovo/odometry/map_segment.h"
 #include "sovo/odometry/trajectory_recorder.h"
@@ -16,13 +18,6 @@
 namespace sovo {
 
 namespace {
-
-/// With fewer inliers tracking is DEGRADED: of poses that are wrong most, of right ones hardly any.
-double degraded_inliers(Backend backend) { return backend == Backend::kDirect ? 0.65 : 0.5; }
-
-const char* compared_by(Backend backend) {
-  return backend == Backend::kDirect ? "pixels" : "features";
-}
 
 constexpr double kNanosecond = 1e-9;
 
@@ -46,7 +41,7 @@ class StereoOdometry::Impl {
           LiveThreads::Callbacks{[this](const MappingOutcome& o) { publish_keyframes(o); },
                                  [this](const ScaleRecord& r) { sink_->on_scale(r); }});
     }
-    begin_segment(SE3());
+    begin_segment(new_segment(next_segment_, 0));
   }
 
   void process(const StereoFrame& frame) {
@@ -67,14 +62,10 @@ class StereoOdometry::Impl {
     SideImage right_side = frame.right;
     right_side.stamp_offset_ns = exposure_offset(frame);
     const SideImage* right = right_problem.empty() ? &right_side : nullptr;
-    const MonoFrame left = prepare_left(frame, segment_->readout_motion().expected(frame.stamp_ns));
     if (segment_->initialized()) {
-      follow(frame, left, right, right_problem, &out);
-    } else if (segment_->initialize(left, right)) {
-      begin_map(frame, left, &out);
+      follow(frame, right, right_problem, &out);
     } else {
-      out.reason = segment_->reason();
-      if (segment_->wants_halving()) initialize_halved(frame, &out);
+      initialize(frame, right, &out);
     }
     fill_counters(&out);
     sink_->on_frame(out);
@@ -88,7 +79,7 @@ class StereoOdometry::Impl {
   void reset() {
     end_segment();
     ++reset_counter_;
-    begin_segment(last_pose_);
+    begin_segment(new_segment(next_segment_, 0));
   }
 
   std::vector<TrajectoryPose> trajectory() const {
@@ -123,12 +114,11 @@ class StereoOdometry::Impl {
     recorder_.close_segment(segment_->vo().keyframes());
   }
 
-  std::unique_ptr<MapSegment> new_segment(std::uint32_t index, const SE3& T_odom_left,
-                                          int halvings) {
+  std::unique_ptr<MapSegment> new_segment(std::uint32_t index, int halvings) {
     const RightTurn known = segment_ ? segment_->right_turn()
                                      : RightTurn(config_.right_turn, preparation_.rig().right.fx);
-    return std::make_unique<MapSegment>(config_, preparation_, index, T_odom_left, halvings, known,
-                                        &pool_, observer_);
+    return std::make_unique<MapSegment>(config_, preparation_, index, halvings, known, &pool_,
+                                        observer_);
   }
 
   void set_segment(std::unique_ptr<MapSegment> segment) {
@@ -137,20 +127,33 @@ class StereoOdometry::Impl {
     if (threads_) threads_->set_segment(segment_.get());
   }
 
-  void begin_segment(const SE3& T_odom_left) {
-    set_segment(new_segment(next_segment_++, T_odom_left, 0));
+  void begin_segment(std::unique_ptr<MapSegment> segment) {
+    set_segment(std::move(segment));
+    ++next_segment_;
     first_frame_.reset();
     failures_ = 0;
+    followed_ = 0;
     distance_ = 0.0;
     published_.reset();
+  }
+
+  void initialize(const StereoFrame& frame, const SideImage* right, OdometryOutput* out) {
+    const MonoFrame left = preparation_.prepare_left(frame, observer_, segment_->halvings());
+    if (segment_->initialize(left, right, reckoning_.at(frame.stamp_ns))) {
+      begin_map(frame, left, out);
+      return;
+    }
+    out->reason = segment_->reason();
+    if (segment_->wants_halving()) initialize_halved(frame, out);
   }
 
   /// What is blurred, noisy or pale at full resolution may be clear enough in smaller images.
   void initialize_halved(const StereoFrame& frame, OdometryOutput* out) {
     for (int halvings = 1; halvings <= preparation_.max_halvings(); ++halvings) {
-      auto segment = new_segment(segment_->index(), last_pose_, halvings);
+      auto segment = new_segment(segment_->index(), halvings);
       const MonoFrame left = preparation_.prepare_left(frame, observer_, halvings);
-      if (!segment->initialize_from_stereo(left, frame.right)) continue;
+      const SE3 T_odom_left = reckoning_.at(frame.stamp_ns);
+      if (!segment->initialize_from_stereo(left, frame.right, T_odom_left)) continue;
       const std::string why = segment_->stereo_problem();
       set_segment(std::move(segment));
       begin_map(frame, left, out);
@@ -178,7 +181,7 @@ class StereoOdometry::Impl {
     out->is_keyframe = true;
     out->keyframe_id = reference->keyframe_id;
     set_pose(first.T_world_camera, Mat6::Zero(), Mat6::Zero(), out);
-    out->state = state_of(*out, FrameTracking(), "");
+    judge(FrameTracking(), "", out);
   }
 
   MonoFrame prepare_left(const StereoFrame& frame, const Vec6& rate) {
@@ -224,8 +227,11 @@ class StereoOdometry::Impl {
   TrackedFrame begin_again(const StereoFrame& first, const StereoFrame& frame,
                            const TrackedFrame& tracked) {
     const Vec6 rate = segment_->readout_motion().found();
-    auto segment = new_segment(segment_->index(), last_pose_, segment_->halvings());
-    if (!segment->initialize_from_stereo(prepare_left(first, rate), first.right)) return tracked;
+    auto segment = new_segment(segment_->index(), segment_->halvings());
+    const SE3 T_odom_left = reckoning_.at(first.stamp_ns);
+    if (!segment->initialize_from_stereo(prepare_left(first, rate), first.right, T_odom_left)) {
+      return tracked;
+    }
     segment->take_start_outcome();
     TrackedFrame again =
         segment->track_from(prepare_left(frame, rate), tracked.tracking.T_current_reference);
@@ -234,18 +240,20 @@ class StereoOdometry::Impl {
     return again;
   }
 
-  void follow(const StereoFrame& frame, const MonoFrame& left, const SideImage* right,
-              const std::string& right_problem, OdometryOutput* out) {
-    TrackedFrame tracked = track(frame, left);
+  void follow(const StereoFrame& frame, const SideImage* right, const std::string& right_problem,
+              OdometryOutput* out) {
+    const Vec6 rate = segment_->readout_motion().expected(frame.stamp_ns);
+    TrackedFrame tracked = track(frame, prepare_left(frame, rate));
     if (first_frame_ && tracked.tracking.good) {
       const StereoFrame first = *std::exchange(first_frame_, std::nullopt);
       tracked = begin_again(first, frame, tracked);
     }
     if (map_broke_down() || !tracked.tracking.good) {
-      lose(tracked.tracking, out);
+      lose(frame, right, tracked.tracking, out);
       return;
     }
     failures_ = 0;
+    ++followed_;
     recorder_.add(tracked);
     const FrameTracking& t = tracked.tracking;
     out->is_keyframe = tracked.wants_keyframe;
@@ -255,8 +263,7 @@ class StereoOdometry::Impl {
     set_pose(tracked.T_world_camera, rotated(tracked.T_world_camera.rotation(), tracked.covariance),
              carried(tracked.reference->covariance, tracked.T_world_camera.translation()), out);
     map(std::move(tracked), right);
-    out->state = state_of(*out, t, right_problem);
-    out->reason = reason_of(*out, t, right_problem);
+    judge(t, right_problem, out);
   }
 
   std::string why_lost(const FrameTracking& tracking) const {
@@ -265,16 +272,45 @@ class StereoOdometry::Impl {
     return "this frame fits the map only where max_acceleration does not let the camera be";
   }
 
-  void lose(const FrameTracking& tracking, OdometryOutput* out) {
+  void lose(const StereoFrame& frame, const SideImage* right, const FrameTracking& tracking,
+            OdometryOutput* out) {
     ++failures_;
     out->state = OdometryState::kLost;
     out->pose_valid = false;
     out->reason = why_lost(tracking);
-    if (failures_ < config_.lost_frames && !map_broke_down()) return;
-    out->reason += "; a new segment begins";
+    const bool over = failures_ >= config_.lost_frames || map_broke_down();
+    if ((over || is_left_behind(frame)) && begin_next_segment(frame, right, over)) {
+      out->reason += "; a new segment begins";
+    }
+  }
+
+  /// Whether no later frame will fit the map any better. One frame may be bad by itself.
+  bool is_left_behind(const StereoFrame& frame) const {
+    constexpr double kFar = 0.25;    // mean depths
+    constexpr double kTurned = 0.4;  // [rad]
+    constexpr int kFewest = 2;
+    if (followed_ == 0) return true;
+    if (failures_ < kFewest) return false;
+    const SE3 moved = reckoning_.since_last(frame.stamp_ns);
+    return moved.translation().norm() * segment_->vo().reference()->mean_rho > kFar ||
+           moved.rotation().log().norm() > kTurned;
+  }
+
+  /// The next segment begins with this frame, if it can; else, if the one before is `over`, with a
+  /// later one.
+  bool begin_next_segment(const StereoFrame& frame, const SideImage* right, bool over) {
+    if (threads_) threads_->drain();
+    auto next = new_segment(next_segment_, 0);
+    const MonoFrame left = preparation_.prepare_left(frame, observer_);
+    const bool begun = next->initialize(left, right, reckoning_.at(frame.stamp_ns));
+    if (!begun && !over) return false;
     end_segment();
     sync_failed_ = false;
-    begin_segment(last_pose_);
+    begin_segment(begun ? std::move(next) : new_segment(next_segment_, 0));
+    OdometryOutput not_published;
+    not_published.stamp_ns = frame.stamp_ns;
+    if (begun) begin_map(frame, left, &not_published);
+    return true;
   }
 
   bool map_broke_down() const { return sync_failed_ || (threads_ && threads_->map_failed()); }
@@ -350,9 +386,10 @@ class StereoOdometry::Impl {
     }
     out->pose_covariance.topLeftCorner<3, 3>() +=
         scale.position_covariance(T_odom_left.translation());
+    if (!scale.locked) reckoning_.forget_motion();
+    reckoning_.note(out->stamp_ns, T_odom_left, published_.has_value() && scale.locked);
     if (published_) set_velocity(scale.sigma, out);
     published_ = Published{out->stamp_ns, T_odom_left, frame};
-    last_pose_ = T_odom_left;
   }
 
   /// From the frame before to this one; both alignments err, and the scale does.
@@ -368,38 +405,8 @@ class StereoOdometry::Impl {
     distance_ += step.translation().norm();
   }
 
-  OdometryState state_of(const OdometryOutput& out, const FrameTracking& t,
-                         const std::string& right_problem) const {
-    const bool tracked = t.good;
-    if (tracked && t.inlier_ratio < degraded_inliers(config_.backend))
-      return OdometryState::kDegraded;
-    if (!right_problem.empty()) return OdometryState::kDegraded;
-    const bool scaled = config_.mode != OdometryMode::kMono;
-    if (scaled && (!out.scale_valid || scale_is_old(out))) return OdometryState::kScaleUnobserved;
-    return OdometryState::kTracking;
-  }
-
-  /// Only a scale that was sought and not found for long is unobserved: standing still makes no
-  /// keyframes and loses no scale.
-  bool scale_is_old(const OdometryOutput& out) const {
-    return out.scale_age_s > config_.scale_timeout_s &&
-           out.scale_verdict != ScaleVerdict::kAccepted;
-  }
-
-  std::string reason_of(const OdometryOutput& out, const FrameTracking& t,
-                        const std::string& right_problem) const {
-    if (!right_problem.empty()) return right_problem + "; the scale is not measured";
-    if (out.state == OdometryState::kDegraded) {
-      return "only " + std::to_string(static_cast<int>(100.0 * t.inlier_ratio)) + " % of the " +
-             compared_by(config_.backend) + " agree";
-    }
-    if (out.state == OdometryState::kScaleUnobserved) {
-      return "scale not measured: " + to_string(out.scale_verdict);
-    }
-    if (out.decalibrated) {
-      return "the right camera is turned against its calibration, which is undone: calibrate again";
-    }
-    return "";
+  void judge(const FrameTracking& tracking, const std::string& right_problem, OdometryOutput* out) {
+    judge_frame(config_, tracking, segment_->vo().reference()->mean_rho, right_problem, out);
   }
 
   StereoOdometryConfig config_;
@@ -420,9 +427,10 @@ class StereoOdometry::Impl {
     Mat6 frame_covariance = Mat6::Zero();
   };
   std::optional<Published> published_;
-  SE3 last_pose_;
+  DeadReckoning reckoning_;
   double distance_ = 0.0;
-  int failures_ = 0;
+  int failures_ = 0;  ///< Frames in a row without a pose.
+  int followed_ = 0;  ///< Frames of the segment with a pose, but for its first.
   bool sync_failed_ = false;
   std::uint64_t received_ = 0;
   std::uint64_t rejected_ = 0;

@@ -96,10 +96,12 @@ TrackingResult DirectOdometry::track_from_any(const TrackingReference& reference
   last.expected = expected;
   TrackingResult out =
       tracker_.track(reference, *frame.pyramid, frame.exposure_s, last_affine_, hypotheses, last);
-  if (out.good && known_motion_ && !is_reachable(*known_motion_, out.T_current_reference)) {
+  const SE3& found = out.T_current_reference;
+  if (out.good && known_motion_ && !is_reachable(*known_motion_, found)) {
     out.good = false;
     out.out_of_reach = true;
   }
+  if (!known_motion_ && !is_near(found, reference.mean_rho)) out.good = false;
   return out;
 }
 

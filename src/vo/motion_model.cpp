@@ -37,6 +37,10 @@ bool is_reachable(const KnownMotion& known, const SE3& T_current_reference) {
   return way_off(known, T_current_reference) <= known.reach;
 }
 
+bool is_near(const SE3& T_current_reference, double mean_rho) {
+  return T_current_reference.translation().norm() * mean_rho < 1.0;
+}
+
 double deviation(const KnownMotion& known, const SE3& T_current_reference) {
   return known.sigma > 0.0 ? way_off(known, T_current_reference) / known.sigma : 0.0;
 }

@@ -330,57 +330,6 @@ TEST(StereoOdometry, NothingButBadImagesNeverBegins) {
   EXPECT_TRUE(run.give(drive_frame(3)).pose_valid);
 }
 
-TEST(StereoOdometry, AfterALossANewSegmentBeginsWhereTheOldOneEnded) {
-  StereoOdometryConfig config = test_config();
-  config.lost_frames = 3;
-  Playback run(config);
-  run.give_drive(0, 6);
-  const SE3 last = run.recorder.frames.back().T_odom_left;
-  for (int i = 6; i < 9; ++i) {
-    const OdometryOutput o = run.give(unrelated_frame(i));
-    EXPECT_EQ(o.state, OdometryState::kLost);
-    EXPECT_FALSE(o.pose_valid);
-    EXPECT_NE(o.reason, "");
-    EXPECT_EQ(o.segment, i < 8 ? 0U : 1U);
-  }
-  EXPECT_NE(run.recorder.frames.back().reason.find("new segment"), std::string::npos);
-  const OdometryOutput again = run.give(drive_frame(9));
-  EXPECT_TRUE(again.pose_valid) << again.reason;
-  EXPECT_EQ(again.segment, 1U);
-  EXPECT_TRUE(again.T_odom_left.matrix().isApprox(last.matrix(), 1e-12));
-  run.give_drive(10, 16);
-  EXPECT_EQ(run.recorder.frames.back().state, OdometryState::kTracking);
-  const auto refined = run.odometry.refined_trajectory();
-  ASSERT_EQ(refined.size(), 13U);
-  EXPECT_NEAR(drive_error({refined.begin() + 6, refined.end()}).scale, 1.0, 0.05);
-}
-
-TEST(StereoOdometry, ACoveredCameraThatIsUncoveredBeginsFromStereoWithoutMotion) {
-  Playback run(test_config());
-  const auto dark = [](int x, int y) { return 4 + (7 * x + 13 * y) % 3; };
-  for (int i = 0; i < 7; ++i) {
-    EXPECT_EQ(run.give(with_left(drive_frame(i), dark)).state, OdometryState::kInitializing);
-  }
-  OdometryOutput last;
-  for (int i = 7; i < 13; ++i) {
-    StereoFrame still = drive_frame(7);
-    still.stamp_ns = drive_frame(i).stamp_ns;
-    last = run.give(still);
-  }
-  EXPECT_EQ(last.state, OdometryState::kTracking) << last.reason;
-  EXPECT_TRUE(last.pose_valid);
-  EXPECT_TRUE(last.scale_valid);
-}
-
-TEST(StereoOdometry, OneUnrelatedFrameLosesNoMap) {
-  Playback run(test_config());
-  run.give_drive(0, 6);
-  EXPECT_EQ(run.give(unrelated_frame(6)).state, OdometryState::kLost);
-  run.give_drive(7, 12);
-  EXPECT_EQ(run.recorder.frames.back().segment, 0U);
-  expect_follows_the_drive(published(run.recorder), 0.015, 0.05);
-}
-
 /// Of a drive that jolts: every third frame is blurred.
 struct JoltedDrive {
   int tracked = 0;
@@ -411,26 +360,6 @@ TEST(StereoOdometry, BlurredFramesMakeNoKeyframesWhereSharpOnesCome) {
   EXPECT_EQ(drive.blurred_keyframes, 0);
   config.vo.keyframe.blurred_sharpness = 0.0;
   EXPECT_GT(JoltedDrive(config).blurred_keyframes, 0) << "the test needs another drive";
-}
-
-TEST(StereoOdometry, ResetBeginsAnew) {
-  for (const bool deterministic : {true, false}) {
-    StereoOdometryConfig config = test_config();
-    config.deterministic = deterministic;
-    Playback run(config);
-    run.give_drive(0, 8);
-    run.odometry.reset();
-    run.give_drive(8, 14);
-    const OdometryOutput& last = run.recorder.frames.back();
-    EXPECT_EQ(last.reset_counter, 1U);
-    EXPECT_EQ(last.segment, 1U);
-    EXPECT_TRUE(last.pose_valid);
-    run.odometry.finish();
-    const auto refined = run.odometry.refined_trajectory();
-    EXPECT_EQ(refined.size(), 14U);
-    EXPECT_LT((refined[8].T_odom_left.translation() - refined[7].T_odom_left.translation()).norm(),
-              0.02);
-  }
 }
 
 TEST(StereoOdometry, StagesAreTimedOnceAFrame) {

@@ -96,6 +96,12 @@ TEST(MotionModel, AccelerationLimitsTheReach) {
   EXPECT_FALSE(is_reachable(*known, beside));
 }
 
+TEST(MotionModel, WhatIsSeenFromAMeanDepthAwayIsNotFoundByChance) {
+  const SO3 turned = SO3::exp(Vec3(0.5, 0, 0));
+  EXPECT_TRUE(is_near(SE3(turned, Vec3(0, 0, 3.9)), 0.25));
+  EXPECT_FALSE(is_near(SE3(turned, Vec3(0, 0, 4.1)), 0.25));
+}
+
 TEST(MotionModel, UsualAccelerationsAreATenthOfTheGreatest) {
   const ReferenceKeyframe reference = reference_at(0, SE3());
   MotionModel model;

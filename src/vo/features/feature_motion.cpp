@@ -95,6 +95,9 @@ TrackedFrame FeatureOdometry::track_against(const MonoFrame& frame,
     out.tracking.out_of_reach = true;
   }
   const FeatureReference& ref = *reference;
+  if (!forecast.known && !is_near(out.tracking.T_current_reference, ref.mean_rho)) {
+    out.tracking.good = false;
+  }
   out.reference = std::move(reference);
   if (!out.tracking.good) return out;
   out.covariance = tracked.covariance;

@@ -13,4 +13,11 @@ std::shared_ptr<ImagePyramid> PyramidPool::take() {
   return pyramids_.back();
 }
 
+void PyramidPool::reserve(std::size_t count, int width, int height, int max_levels) {
+  while (pyramids_.size() < count) {
+    pyramids_.push_back(std::make_shared<ImagePyramid>());
+    pyramids_.back()->rebuild(max_levels, [&](ImageF* image) { *image = ImageF(width, height); });
+  }
+}
+
 }  // namespace sovo

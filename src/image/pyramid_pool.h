@@ -16,6 +16,10 @@ class PyramidPool {
   /// any.
   std::shared_ptr<ImagePyramid> take();
 
+  /// Makes `count` pyramids beforehand, their memory written once: the first frames would else wait
+  /// until the kernel has found and cleared pages for them.
+  void reserve(std::size_t count, int width, int height, int max_levels);
+
  private:
   std::vector<std::shared_ptr<ImagePyramid>> pyramids_;
   std::size_t next_ = 0;

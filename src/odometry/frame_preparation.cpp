@@ -33,6 +33,13 @@ bool is_black(const SideImage& side) {
   return true;
 }
 
+/// Left images that are held at once: of the window's keyframes, and of the newest frame.
+std::size_t images_held(const StereoOdometryConfig& config) {
+  const int keyframes = config.backend == Backend::kDirect ? config.vo.keyframe.max_keyframes
+                                                           : config.features.max_keyframes;
+  return static_cast<std::size_t>(keyframes) + 1;
+}
+
 }  // namespace
 
 ScopedStage::ScopedStage(StageObserver* observer, Stage stage)
@@ -65,6 +72,7 @@ FramePreparation::FramePreparation(const StereoOdometryConfig& config, const Ste
     right_unroller_.emplace(rig.right, rig.right);
   }
   add_resolutions(rig, mask, config.max_halvings);
+  left_pyramids_.reserve(images_held(config), rig.left.width, rig.left.height, max_levels_);
 }
 
 void FramePreparation::add_resolutions(const StereoRig& rig, const ImageU8& mask,

@@ -26,28 +26,33 @@ StereoFrame elsewhere(int i) {
 }  // namespace
 
 TEST(LostTrack, AfterALossANewSegmentBeginsWhereTheMotionLed) {
-  StereoOdometryConfig config = test_config();
-  config.lost_frames = 3;
-  Playback run(config);
-  run.give_drive(0, 6);
-  const OdometryOutput last = run.recorder.frames.back();
-  for (int i = 6; i < 9; ++i) {
-    const OdometryOutput o = run.give(unrelated_frame(i));
-    EXPECT_EQ(o.state, OdometryState::kLost);
-    EXPECT_FALSE(o.pose_valid);
-    EXPECT_NE(o.reason, "");
-    EXPECT_EQ(o.segment, i < 8 ? 0U : 1U);
+  for (const bool deterministic : {true, false}) {
+    StereoOdometryConfig config = test_config();
+    config.deterministic = deterministic;
+    config.wait_for_mapping = true;
+    config.lost_frames = 3;
+    Playback run(config);
+    run.give_drive(0, 6);
+    const OdometryOutput last = run.recorder.frames.back();
+    for (int i = 6; i < 9; ++i) {
+      const OdometryOutput o = run.give(unrelated_frame(i));
+      EXPECT_EQ(o.state, OdometryState::kLost);
+      EXPECT_FALSE(o.pose_valid);
+      EXPECT_NE(o.reason, "");
+      EXPECT_EQ(o.segment, i < 8 ? 0U : 1U);
+    }
+    EXPECT_NE(run.recorder.frames.back().reason.find("new segment"), std::string::npos);
+    const OdometryOutput again = run.give(drive_frame(9));
+    EXPECT_TRUE(again.pose_valid) << again.reason;
+    EXPECT_EQ(again.segment, 1U);
+    EXPECT_LT(step_error(last, again), 0.01) << "of 0.12 m";
+    run.give_drive(10, 16);
+    EXPECT_EQ(run.recorder.frames.back().state, OdometryState::kTracking);
+    run.odometry.finish();
+    const auto refined = run.odometry.refined_trajectory();
+    ASSERT_EQ(refined.size(), 13U);
+    EXPECT_NEAR(drive_error({refined.begin() + 6, refined.end()}).scale, 1.0, 0.05);
   }
-  EXPECT_NE(run.recorder.frames.back().reason.find("new segment"), std::string::npos);
-  const OdometryOutput again = run.give(drive_frame(9));
-  EXPECT_TRUE(again.pose_valid) << again.reason;
-  EXPECT_EQ(again.segment, 1U);
-  EXPECT_LT(step_error(last, again), 0.01) << "of 0.12 m";
-  run.give_drive(10, 16);
-  EXPECT_EQ(run.recorder.frames.back().state, OdometryState::kTracking);
-  const auto refined = run.odometry.refined_trajectory();
-  ASSERT_EQ(refined.size(), 13U);
-  EXPECT_NEAR(drive_error({refined.begin() + 6, refined.end()}).scale, 1.0, 0.05);
 }
 
 TEST(LostTrack, AMapThatTheNextFrameDoesNotFitBeginsAnewWithThat) {

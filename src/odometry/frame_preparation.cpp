@@ -19,18 +19,25 @@ std::int64_t steady_now_ns() {
       .count();
 }
 
-/// Whether every byte of a sparse grid over the image is zero: a covered or dead camera.
-bool is_black(const SideImage& side) {
+/// The pixels of a sparse grid over the image, full scale 65535.
+template <class Visit>
+void for_sparse_pixels(const SideImage& side, const Visit& visit) {
   constexpr int kStride = 7;
-  const int bytes = side.format == PixelFormat::kMono16 ? 2 : 1;
+  const bool wide = side.format == PixelFormat::kMono16;
   const std::uint8_t* data = side.data->data();
   for (int y = 0; y < side.height; y += kStride) {
     const std::uint8_t* row = data + static_cast<std::ptrdiff_t>(y) * side.step;
-    for (int x = 0; x < side.width * bytes; x += kStride) {
-      if (row[x] != 0) return false;
+    for (int x = 0; x < side.width; x += kStride) {
+      visit(wide ? row[2 * x] + 256 * row[2 * x + 1] : 257 * row[x]);
     }
   }
-  return true;
+}
+
+/// Whether every pixel of a sparse grid over the image is zero: a covered or dead camera.
+bool is_black(const SideImage& side) {
+  bool black = true;
+  for_sparse_pixels(side, [&](int grey) { black = black && grey == 0; });
+  return black;
 }
 
 /// Left images that are held at once: of the window's keyframes, and of the newest frame.
@@ -73,6 +80,28 @@ FramePreparation::FramePreparation(const StereoOdometryConfig& config, const Ste
   }
   add_resolutions(rig, mask, config.max_halvings);
   left_pyramids_.reserve(images_held(config), rig.left.width, rig.left.height, max_levels_);
+}
+
+std::string FramePreparation::exposure_problem(const SideImage& side) {
+  constexpr int kWhite = 250 * 257;
+  constexpr int kDark = 6 * 257;
+  constexpr double kTooWhite = 0.5;
+  constexpr double kTooDark = 0.9;
+  double all = 0.0;
+  double white = 0.0;
+  double dark = 0.0;
+  for_sparse_pixels(side, [&](int grey) {
+    all += 1.0;
+    white += grey >= kWhite ? 1.0 : 0.0;
+    dark += grey <= kDark ? 1.0 : 0.0;
+  });
+  if (white > kTooWhite * all) {
+    return "more than half of the left image is white: shorten the exposure";
+  }
+  if (dark > kTooDark * all) {
+    return "nine tenths of the left image are dark: lengthen the exposure, or give it light";
+  }
+  return "";
 }
 
 void FramePreparation::add_resolutions(const StereoRig& rig, const ImageU8& mask,

@@ -35,6 +35,10 @@ class FramePreparation {
   /// What is wrong with a side: missing, of another size, black; empty when nothing is.
   std::string check_side(const SideImage& side, bool is_left) const;
 
+  /// What is wrong with the exposure of a left image, so that little can be made of it: most of it
+  /// is white or dark. Empty when nothing is. Precondition: as for `prepare_left`.
+  static std::string exposure_problem(const SideImage& side);
+
   /// Left image ready to be tracked. `rate`: how a camera with a rolling shutter moves meanwhile
   /// (MonoFrame::rate). Precondition: `check_side` found nothing.
   MonoFrame prepare_left(const StereoFrame& frame, StageObserver* observer, int halvings = 0,

@@ -143,7 +143,7 @@ class StereoOdometry::Impl {
       begin_map(frame, left, out);
       return;
     }
-    out->reason = segment_->reason();
+    out->reason = with_exposure(segment_->reason(), frame);
     if (segment_->wants_halving()) initialize_halved(frame, out);
   }
 
@@ -266,6 +266,12 @@ class StereoOdometry::Impl {
     judge(t, right_problem, out);
   }
 
+  /// What goes wrong, and that it is the exposure's fault, if it is.
+  static std::string with_exposure(const std::string& reason, const StereoFrame& frame) {
+    const std::string problem = FramePreparation::exposure_problem(frame.left);
+    return problem.empty() ? reason : reason + "; " + problem;
+  }
+
   std::string why_lost(const FrameTracking& tracking) const {
     if (map_broke_down()) return "the map broke down";
     if (!tracking.out_of_reach) return "this frame does not fit the map";
@@ -277,7 +283,7 @@ class StereoOdometry::Impl {
     ++failures_;
     out->state = OdometryState::kLost;
     out->pose_valid = false;
-    out->reason = why_lost(tracking);
+    out->reason = with_exposure(why_lost(tracking), frame);
     const bool over = failures_ >= config_.lost_frames || map_broke_down();
     if ((over || is_left_behind(frame)) && begin_next_segment(frame, right, over)) {
       out->reason += "; a new segment begins";

@@ -330,6 +330,25 @@ TEST(StereoOdometry, NothingButBadImagesNeverBegins) {
   EXPECT_TRUE(run.give(drive_frame(3)).pose_valid);
 }
 
+TEST(StereoOdometry, TellsWhenItIsTheExposuresFault) {
+  const auto saturated = [](int x, int) { return x < 220 ? 255 : 120; };
+  const auto dark = [](int x, int y) { return y < 170 ? (7 * x + 13 * y) % 6 : 120; };
+  const auto reason_of = [](const std::function<int(int, int)>& value, int from) {
+    Playback run(test_config());
+    run.give_drive(0, from);
+    const OdometryOutput out = run.give(with_left(drive_frame(from), value));
+    EXPECT_FALSE(out.pose_valid);
+    return out.reason;
+  };
+  for (const int from : {0, 4}) {
+    EXPECT_NE(reason_of(saturated, from).find("shorten the exposure"), std::string::npos);
+    EXPECT_NE(reason_of(dark, from).find("lengthen the exposure"), std::string::npos);
+    const std::string grey = reason_of([](int, int) { return 90; }, from);
+    EXPECT_NE(grey, "");
+    EXPECT_EQ(grey.find("exposure"), std::string::npos) << grey;
+  }
+}
+
 /// Of a drive that jolts: every third frame is blurred.
 struct JoltedDrive {
   int tracked = 0;

@@ -94,6 +94,17 @@ TEST_P(Backend, APoseOutOfReachIsNone) {
   EXPECT_TRUE(vo_->track(leap, 140.0).tracking.good);
 }
 
+TEST_P(Backend, NothingIsFoundAMeanDepthAwayWhereNoMotionIsKnown) {
+  for (const double way : {0.9, 1.1}) {
+    begin(first_, vo_.get());
+    const SE3 back(SO3(), Vec3(0.0, 0.0, -way / vo_->reference()->mean_rho));
+    const TrackedFrame there = vo_->track_from(frame_at(scene_, back, 1), back.inverse());
+    EXPECT_EQ(there.tracking.good, way < 1.0);
+    const SE3 off = there.tracking.T_current_reference * back;
+    EXPECT_LT(off.translation().norm() * vo_->reference()->mean_rho, 0.03) << "it would be right";
+  }
+}
+
 TEST_P(Backend, AFirstMotionOfManyPixelsIsFound) {
   // A vehicle may already move when the map begins.
   int index = 0;

@@ -125,7 +125,8 @@ struct StereoOdometryConfig {
     v("seed", seed, "of every random choice");
     v("mapping_queue", mapping_queue, "frames that may wait for mapping before one is dropped");
     v("wait_for_mapping", wait_for_mapping, "wait for mapping instead of dropping frames");
-    v("lost_frames", lost_frames, "frames in a row without a pose that begin a new segment");
+    v("lost_frames", lost_frames,
+      "frames in a row without a pose that begin a new segment, at the latest");
     v("max_acceleration", max_acceleration,
       "a pose that takes more since the frames before is none, and of poses that fit alike "
       "one that takes more than a tenth is unlikely [m/s^2]; 0: neither");

@@ -4,6 +4,7 @@
 #include <memory>
 #include <random>
 #include <thread>
+#include <utility>
 
 #include "sovo/app/commands.h"
 #include "sovo/app/config_options.h"
@@ -34,11 +35,14 @@ std::int64_t utc_now_ns() {
 /// Frames on their way to the bus.
 class Publication {
  public:
+  using SayAgain = std::function<Result<void>()>;
+  /// `say_calibration`: publishes it again; empty: once is enough.
   Publication(FrameInput& input, bridge::CameraPublisher& publisher, VoFollower& follower,
-              StopSignal& stop)
+              SayAgain say_calibration, StopSignal& stop)
       : input_(input),
         publisher_(publisher),
         follower_(follower),
+        say_calibration_(std::move(say_calibration)),
         stop_([&stop] { return stop.requested(); }) {}
 
   /// Publishes everything; returns an exit code. `paced`: wait for the odometry.
@@ -73,14 +77,20 @@ class Publication {
     constexpr std::chrono::seconds kPatience(5);
     constexpr std::chrono::milliseconds kSettled(300);
     constexpr std::chrono::milliseconds kSettledWithoutOdometry(2000);
+    constexpr std::chrono::milliseconds kSayAgain(500);
     const auto begin = Clock::now();
     auto changed = begin;
+    auto said = begin;
     std::uint32_t listeners = 0;
     while (!stop_()) {
       const auto now = Clock::now();
       const std::uint32_t found = publisher_.num_readers();
       if (found != listeners) changed = now;
       listeners = found;
+      if (say_calibration_ && !follower_.sees_odometry() && now - said > kSayAgain) {
+        if (auto done = say_calibration_(); !done) spdlog::warn("{}", done.error());
+        said = now;
+      }
       const auto settled = follower_.sees_odometry() ? kSettled : kSettledWithoutOdometry;
       if (listeners > 0 && now - changed > settled) return;
       if (listeners == 0 && now - begin > kPatience) {
@@ -94,6 +104,7 @@ class Publication {
   FrameInput& input_;
   bridge::CameraPublisher& publisher_;
   VoFollower& follower_;
+  SayAgain say_calibration_;
   std::function<bool()> stop_;
   std::uint64_t last_ = 0;
   std::size_t published_ = 0;
@@ -110,12 +121,18 @@ int publish(const AppConfig& config, const std::function<Result<FrameInput>()>& 
 
   StereoCameras cameras = input->cameras;
   if (!config.camera.name.empty()) cameras.rig.name = config.camera.name;
-  auto publisher = bridge::CameraPublisher::open(*participant, cameras, utc_now_ns());
+  const std::int64_t stamp_ns = utc_now_ns();
+  auto publisher = bridge::CameraPublisher::open(*participant, cameras, stamp_ns);
   if (!publisher) return fail(kFailed, publisher.error());
   const std::uint64_t session = random_session();
   auto follower = VoFollower::open(*participant, session);
   if (!follower) return fail(kFailed, follower.error());
-  return Publication(*input, *publisher, *follower, stop).run(session, input->rate == 0.0);
+  Publication::SayAgain say_again;
+  if (config.dds.transport == bridge::Transport::kShm) {
+    say_again = [&] { return publisher->publish_static(*participant, cameras, stamp_ns); };
+  }
+  return Publication(*input, *publisher, *follower, std::move(say_again), stop)
+      .run(session, input->rate == 0.0);
 }
 
 int publish_dataset(const AppConfig& config) {

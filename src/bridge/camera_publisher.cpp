@@ -38,14 +38,14 @@ Result<CameraPublisher> CameraPublisher::open(const Participant& participant,
   if (!views) return views.failure();
   CameraPublisher publisher(std::move(*stereo), std::move(*calibration), std::move(*tf_static),
                             std::move(*views), left_frame);
-  const auto done = publisher.publish_static(participant, cameras, camera, stamp_ns);
+  const auto done = publisher.publish_static(participant, cameras, stamp_ns);
   if (!done) return done.failure();
   return publisher;
 }
 
 Result<void> CameraPublisher::publish_static(const Participant& participant,
-                                             const StereoCameras& cameras,
-                                             const std::string& camera, std::int64_t stamp_ns) {
+                                             const StereoCameras& cameras, std::int64_t stamp_ns) {
+  const std::string camera = camera_name(cameras.rig.name);
   const CalibrationMessage calibration(cameras, left_frame_, stamp_ns);
   auto done = calibration_.write(calibration.message());
   if (!done) return done;

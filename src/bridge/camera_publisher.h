@@ -25,6 +25,11 @@ class CameraPublisher {
   static Result<CameraPublisher> open(const Participant& participant, const StereoCameras& cameras,
                                       std::int64_t stamp_ns);
 
+  /// Publishes calibration and static transforms again, which `open` has done once: in shared
+  /// memory they can get lost while a reader is being found.
+  Result<void> publish_static(const Participant& participant, const StereoCameras& cameras,
+                              std::int64_t stamp_ns);
+
   /// Publishes a frame; its empty `frame_id` becomes the left optical frame of this publisher.
   /// Pixels are serialized from where they lie. `colour`: of the frame, where it was kept.
   Result<void> publish(const StereoFrame& frame, const StereoColour& colour = {});
@@ -47,9 +52,6 @@ class CameraPublisher {
         tf_static_(std::move(tf_static)),
         views_(std::move(views)),
         left_frame_(std::move(left_frame)) {}
-
-  Result<void> publish_static(const Participant& participant, const StereoCameras& cameras,
-                              const std::string& camera, std::int64_t stamp_ns);
 
   Writer<msg::StereoFrame> stereo_;
   Writer<msg::StereoCalibration> calibration_;

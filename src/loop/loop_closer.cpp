@@ -61,22 +61,6 @@ double median_of(std::vector<float> values) {
   return *middle;
 }
 
-/// A keypoint of an image that was halved so often, where the whole image has it.
-Keypoint in_whole_image(Keypoint keypoint, int halvings) {
-  keypoint.u = from_halved(keypoint.u, halvings);
-  keypoint.v = from_halved(keypoint.v, halvings);
-  keypoint.level = static_cast<std::uint8_t>(keypoint.level + halvings);
-  return keypoint;
-}
-
-/// Where two masks of equal size both allow pixels; an empty one allows all.
-ImageU8 both(const ImageU8& a, const ImageU8& b) {
-  if (a.empty()) return b;
-  ImageU8 out = a;
-  for (std::size_t i = 0; i < out.size(); ++i) out.data()[i] = std::min(a.data()[i], b.data()[i]);
-  return out;
-}
-
 double angle_between(const SE3& a, const SE3& b) {
   return (a.rotation().inverse() * b.rotation()).log().norm();
 }
@@ -87,14 +71,10 @@ LoopCloser::LoopCloser(const LoopConfig& config, const StaticMatcherConfig& matc
                        const StereoRig& rig, ImageU8 mask)
     : config_(config), matcher_config_(matcher), rig_(rig), mask_(std::move(mask)) {}
 
-const LoopCloser::Resolution& LoopCloser::resolution(int halvings) {
-  const auto found = resolutions_.find(halvings);
-  if (found != resolutions_.end()) return found->second;
-  StereoRig rig = rig_;
-  rig.left = rig_.left.at_level(halvings);
-  rig.right = rig_.right.at_level(halvings);
-  Resolution made{StaticMatcher(matcher_config_, rig), reduced_mask(mask_, 1 << halvings)};
-  return resolutions_.emplace(halvings, std::move(made)).first->second;
+const ImageU8& LoopCloser::mask(int halvings) {
+  const auto found = masks_.find(halvings);
+  if (found != masks_.end()) return found->second;
+  return masks_.emplace(halvings, reduced_mask(mask_, 1 << halvings)).first->second;
 }
 
 bool LoopCloser::is_place(const KeyframeOutput& keyframe) const {
@@ -117,19 +97,10 @@ LoopCloser::Node LoopCloser::make_node(const KeyframeOutput& keyframe) {
   place.covariance = keyframe.covariance;
   const double rho = median_of(keyframe.inverse_depth);
   place.median_depth = rho > 0.0 ? 1.0 / rho : 1.0;
-  const auto& [matcher, mask] = resolution(keyframe.halvings);
-  const StaticMatcher at_exposures = matcher.moved(keyframe.T_later_left);
-  const ImageU8 usable = keyframe.co_moving_mask ? both(mask, *keyframe.co_moving_mask) : mask;
-  for (const Keypoint& keypoint : detect_keypoints(*keyframe.left, usable, config_.keypoints)) {
-    Landmark landmark{.keypoint = in_whole_image(keypoint, keyframe.halvings)};
-    const StaticMatch match =
-        at_exposures.match(*keyframe.left, *keyframe.right, keypoint.u, keypoint.v);
-    if (match.state == MatchState::kMatched && match.inverse_depth > 2.0F * match.sigma) {
-      landmark.inverse_depth = match.inverse_depth;
-      landmark.sigma = match.sigma;
-    }
-    place.landmarks.push_back(landmark);
-  }
+  StereoView view{keyframe.left, keyframe.right, keyframe.T_later_left, keyframe.halvings,
+                  mask(keyframe.halvings)};
+  if (keyframe.co_moving_mask) view.mask = both_masks(view.mask, *keyframe.co_moving_mask);
+  place.landmarks = find_landmarks(view, matcher_config_, rig_, config_.keypoints);
   made.T_map_left = T_map_odom() * place.T_odom_left;
   return made;
 }

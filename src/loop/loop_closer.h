@@ -9,11 +9,12 @@
 
 #include "sovo/geometry/stereo_rig.h"
 #include "sovo/image/static_matcher.h"
-#include "sovo/loop/place.h"
 #include "sovo/loop/place_index.h"
-#include "sovo/loop/place_matcher.h"
 #include "sovo/loop/pose_graph.h"
 #include "sovo/odometry/odometry_output.h"
+#include "sovo/place/landmarks.h"
+#include "sovo/place/place.h"
+#include "sovo/place/place_matcher.h"
 
 namespace sovo {
 
@@ -112,12 +113,8 @@ class LoopCloser {
   };
 
   bool is_place(const KeyframeOutput& keyframe) const;
-  /// What finds landmarks in images that were halved so often.
-  struct Resolution {
-    StaticMatcher matcher;
-    ImageU8 mask;
-  };
-  const Resolution& resolution(int halvings);
+  /// Of images that were halved so often.
+  const ImageU8& mask(int halvings);
   Node make_node(const KeyframeOutput& keyframe);
   void revise(const KeyframeOutput& keyframe);
   std::optional<std::uint32_t> nearest_place(const Node& from, std::uint32_t end) const;
@@ -139,7 +136,7 @@ class LoopCloser {
   StaticMatcherConfig matcher_config_;
   StereoRig rig_;
   ImageU8 mask_;
-  std::map<int, Resolution> resolutions_;  ///< By the number of halvings.
+  std::map<int, ImageU8> masks_;  ///< By the number of halvings.
 
   std::uint32_t first_ = 0;  ///< Number of the oldest place.
   std::deque<Node> nodes_;

@@ -4,7 +4,7 @@
 #include <map>
 #include <vector>
 
-#include "sovo/loop/place.h"
+#include "sovo/place/place.h"
 
 namespace sovo {
 

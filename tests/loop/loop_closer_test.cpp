@@ -4,7 +4,7 @@
 
 #include <map>
 
-#include "loop/loop_test_support.h"
+#include "place/place_test_support.h"
 #include "sovo/geometry/pose_covariance.h"
 #include "sovo/image/halving.h"
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "loop/loop_test_support.h"
+#include "place/place_test_support.h"
 
 namespace sovo {
 namespace {

@@ -89,7 +89,7 @@ std::size_t FeatureAdjuster::first_free(const FeatureWindow& window) const {
   return n > 2 ? 2 : 1;
 }
 
-double FeatureAdjuster::damping_of(const Landmark& landmark, double mean_rho) const {
+double FeatureAdjuster::damping_of(const FeatureLandmark& landmark, double mean_rho) const {
   double damping = config_.depth_damping / (mean_rho * mean_rho);
   if (landmark.static_sigma > 0.0 && landmark.parallax < config_.min_parallax) {
     damping += 1.0 / (landmark.static_sigma * landmark.static_sigma);
@@ -109,8 +109,8 @@ FeatureAdjuster::System FeatureAdjuster::linearize(const FeatureWindow& window) 
   s.touched.resize(window.landmarks.size());
   s.H_rho_frame = MatX::Zero(size, static_cast<Eigen::Index>(window.landmarks.size()));
   const PairPoses pairs(window);
-  for (const Landmark& l : window.landmarks) s.damping.push_back(damping_of(l, mean_rho));
-  for_each_inlier(window, [&](std::size_t i, const Landmark& l, const Observation& o) {
+  for (const FeatureLandmark& l : window.landmarks) s.damping.push_back(damping_of(l, mean_rho));
+  for_each_inlier(window, [&](std::size_t i, const FeatureLandmark& l, const Observation& o) {
     Reprojection p;
     const std::size_t target = window.index_of(o.keyframe_id);
     const std::size_t host = window.index_of(l.host_id);
@@ -147,7 +147,7 @@ FeatureAdjuster::System FeatureAdjuster::linearize(const FeatureWindow& window) 
 double FeatureAdjuster::energy_of(const FeatureWindow& window) const {
   double energy = 0.0;
   const PairPoses pairs(window);
-  for_each_inlier(window, [&](std::size_t, const Landmark& l, const Observation& o) {
+  for_each_inlier(window, [&](std::size_t, const FeatureLandmark& l, const Observation& o) {
     Vec2 pixel;
     // What would come to lie behind the camera has gone too far.
     constexpr double kBehind = 1e6;
@@ -169,7 +169,7 @@ void FeatureAdjuster::take_step(const VecX& frames, const VecX& depths,
     T = SE3::exp(x) * T;
   }
   for (std::size_t i = 0; i < window->landmarks.size(); ++i) {
-    Landmark& l = window->landmarks[i];
+    FeatureLandmark& l = window->landmarks[i];
     if (l.has_depth) l.rho = std::max(least, l.rho + depths[static_cast<Eigen::Index>(i)]);
   }
 }
@@ -178,7 +178,7 @@ void FeatureAdjuster::take_step(const VecX& frames, const VecX& depths,
 double FeatureAdjuster::mark_outliers(FeatureWindow* window) const {
   std::vector<double> errors;
   std::vector<Observation*> observations;
-  for (Landmark& l : window->landmarks) {
+  for (FeatureLandmark& l : window->landmarks) {
     if (!l.has_depth) continue;
     for (Observation& o : l.observations) {
       Vec2 pixel;
@@ -198,8 +198,8 @@ double FeatureAdjuster::mark_outliers(FeatureWindow* window) const {
 
 /// What the observations tell of each depth, all poses held, and how far it moves them.
 void FeatureAdjuster::measure_landmarks(FeatureWindow* window) const {
-  for (Landmark& l : window->landmarks) l.information = l.parallax = 0.0;
-  for_each_inlier(*window, [&](std::size_t, Landmark& l, const Observation& o) {
+  for (FeatureLandmark& l : window->landmarks) l.information = l.parallax = 0.0;
+  for_each_inlier(*window, [&](std::size_t, FeatureLandmark& l, const Observation& o) {
     Reprojection p;
     if (!reproject(window->camera, window->T_target_host(o.keyframe_id, l.host_id), l.ray, l.rho,
                    &p)) {
@@ -253,7 +253,7 @@ BundleResult FeatureAdjuster::optimize(FeatureWindow* window) {
     ++result.iterations;
     const auto keyframes_before = window->keyframes;
     std::vector<double> rho_before;
-    for (const Landmark& l : window->landmarks) rho_before.push_back(l.rho);
+    for (const FeatureLandmark& l : window->landmarks) rho_before.push_back(l.rho);
     take_step(frames, depths, window);
     const double after = energy_of(*window);
     if (!(after <= energy)) {
@@ -271,7 +271,7 @@ BundleResult FeatureAdjuster::optimize(FeatureWindow* window) {
   const double spread = mark_outliers(window);
   measure_landmarks(window);
   double sum = 0.0;
-  for_each_inlier(*window, [&](std::size_t, const Landmark& l, const Observation& o) {
+  for_each_inlier(*window, [&](std::size_t, const FeatureLandmark& l, const Observation& o) {
     Vec2 pixel;
     if (!reproject(window->camera, window->T_target_host(o.keyframe_id, l.host_id), l.ray, l.rho,
                    &pixel)) {

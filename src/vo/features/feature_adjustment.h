@@ -41,7 +41,7 @@ class FeatureAdjuster {
 
  private:
   double energy_of(const FeatureWindow& window) const;
-  double damping_of(const Landmark& landmark, double mean_rho) const;
+  double damping_of(const FeatureLandmark& landmark, double mean_rho) const;
   double mark_outliers(FeatureWindow* window) const;
   void measure_landmarks(FeatureWindow* window) const;
   Mat6 newest_covariance(const FeatureWindow& window) const;

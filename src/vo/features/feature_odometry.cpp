@@ -41,8 +41,8 @@ struct TriangulatedDepth {
   double rho = 0.0;
 };
 
-TriangulatedDepth triangulate(const FeatureWindow& window, const Landmark& landmark, double start,
-                              double outlier_sigmas) {
+TriangulatedDepth triangulate(const FeatureWindow& window, const FeatureLandmark& landmark,
+                              double start, double outlier_sigmas) {
   TriangulatedDepth out{.rho = start};
   constexpr int kIterations = 8;
   double information = 0.0;
@@ -101,7 +101,7 @@ std::vector<SelectedPixel> FeatureOdometry::select_free_corners(const MonoFrame&
     free.fill(255);
   }
   const int spacing = spacing_for(camera_, config_.features);
-  for (const Landmark& l : window_.landmarks) {
+  for (const FeatureLandmark& l : window_.landmarks) {
     if (l.host_id == window_.newest().id) {
       blank(l.u, l.v, spacing, &free);
     } else if (const Observation* seen = l.seen_in(window_.newest().id)) {
@@ -135,7 +135,7 @@ std::vector<SelectedPixel> FeatureOdometry::select_free_corners(const MonoFrame&
 
 void FeatureOdometry::add_landmark(const SelectedPixel& pixel, const DepthProposal& depth,
                                    const FeatureKeyframe& host) {
-  Landmark l;
+  FeatureLandmark l;
   l.host_id = host.id;
   l.u = static_cast<float>(pixel.x);
   l.v = static_cast<float>(pixel.y);
@@ -243,7 +243,7 @@ void FeatureOdometry::insert_keyframe(const TrackedFrame& tracked, const SE3& T_
 /// Landmarks that began without a depth get one as soon as their observations tell it.
 void FeatureOdometry::give_depths() {
   const double start = window_.mean_inverse_depth();
-  for (Landmark& l : window_.landmarks) {
+  for (FeatureLandmark& l : window_.landmarks) {
     if (l.has_depth || l.observations.empty()) continue;
     const TriangulatedDepth depth = triangulate(window_, l, start, config_.outlier_sigmas);
     if (!depth.good) continue;
@@ -255,7 +255,7 @@ void FeatureOdometry::give_depths() {
 /// Those that neither the newest keyframe nor a later one will see.
 void FeatureOdometry::drop_unseen() {
   const std::uint32_t newest = window_.newest().id;
-  for (Landmark& l : window_.landmarks) {
+  for (FeatureLandmark& l : window_.landmarks) {
     const bool lost = !l.has_depth && l.seen_in(newest) == nullptr;
     const bool only_outliers = l.has_depth && !l.observations.empty() && l.num_inliers() == 0;
     l.remove = lost || only_outliers;
@@ -275,8 +275,9 @@ std::vector<KeyframeState> FeatureOdometry::drop_oldest() {
 void FeatureOdometry::add_landmarks(const MonoFrame& frame, const DepthProposer& proposer,
                                     const MapTimer& timer) {
   const std::uint32_t newest = window_.newest().id;
-  const auto seen = std::count_if(window_.landmarks.begin(), window_.landmarks.end(),
-                                  [&](const Landmark& l) { return l.seen_in(newest) != nullptr; });
+  const auto seen =
+      std::count_if(window_.landmarks.begin(), window_.landmarks.end(),
+                    [&](const FeatureLandmark& l) { return l.seen_in(newest) != nullptr; });
   const int wanted = config_.features - static_cast<int>(seen);
   std::vector<SelectedPixel> pixels;
   {
@@ -303,7 +304,7 @@ void FeatureOdometry::publish_reference() {
   next->covariance = history_.covariance();
   next->mean_rho = window_.mean_inverse_depth();
   next->keyframe_poses = window_.poses();
-  for (const Landmark& l : window_.landmarks) {
+  for (const FeatureLandmark& l : window_.landmarks) {
     const Observation* seen = l.seen_in(newest.id);
     ReferenceFeature f;
     f.seen = l.host_id == newest.id || (seen != nullptr && seen->inlier);
@@ -345,7 +346,7 @@ void FeatureOdometry::take_snapshot() {
   s.pyramid = newest.pyramid;
   s.mean_inverse_depth = window_.mean_inverse_depth();
   std::size_t shared = 0;
-  for (Landmark& l : window_.landmarks) {
+  for (FeatureLandmark& l : window_.landmarks) {
     const bool was_in = std::exchange(l.in_snapshot, false);
     const Observation* seen = l.seen_in(newest.id);
     if (!l.has_depth || seen == nullptr || !seen->inlier || !(l.information > 0.0)) continue;
@@ -378,7 +379,7 @@ double FeatureOdometry::apply(const ScaleCorrection& correction) {
   return log_scale;
 }
 
-void FeatureOdometry::keep_point(const Landmark& landmark, KeyframePoints* points) const {
+void FeatureOdometry::keep_point(const FeatureLandmark& landmark, KeyframePoints* points) const {
   if (!landmark.has_depth || !(landmark.information > 0.0)) return;
   const double sigma = 1.0 / std::sqrt(landmark.information);
   if (sigma > kMaxRelativeSigma * landmark.rho) return;
@@ -393,7 +394,7 @@ std::vector<KeyframeState> FeatureOdometry::window_keyframes() const {
   std::vector<KeyframeState> states;
   for (const FeatureKeyframe& k : window_.keyframes) {
     states.push_back({k.id, k.stamp_ns, k.pyramid, {}});
-    for (const Landmark& l : window_.landmarks) {
+    for (const FeatureLandmark& l : window_.landmarks) {
       if (l.host_id == k.id) keep_point(l, &states.back().points);
     }
   }

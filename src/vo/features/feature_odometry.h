@@ -69,7 +69,7 @@ class FeatureOdometry final : public MonocularBackend {
                     const FeatureKeyframe& host);
   void publish_reference();
   void take_snapshot();
-  void keep_point(const Landmark& landmark, KeyframePoints* points) const;
+  void keep_point(const FeatureLandmark& landmark, KeyframePoints* points) const;
 
   FeatureConfig config_;
   KeyframeConfig keyframe_config_;

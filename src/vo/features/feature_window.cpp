@@ -6,19 +6,19 @@
 
 namespace sovo {
 
-const Observation* Landmark::seen_in(std::uint32_t keyframe_id) const {
+const Observation* FeatureLandmark::seen_in(std::uint32_t keyframe_id) const {
   const auto found =
       std::find_if(observations.rbegin(), observations.rend(),
                    [&](const Observation& o) { return o.keyframe_id == keyframe_id; });
   return found == observations.rend() ? nullptr : &*found;
 }
 
-int Landmark::num_inliers() const {
+int FeatureLandmark::num_inliers() const {
   return static_cast<int>(std::count_if(observations.begin(), observations.end(),
                                         [](const Observation& o) { return o.inlier; }));
 }
 
-double Landmark::sigma(double min_parallax) const {
+double FeatureLandmark::sigma(double min_parallax) const {
   double known = information;
   if (static_sigma > 0.0 && parallax < min_parallax) known += 1.0 / (static_sigma * static_sigma);
   return known > 0.0 ? 1.0 / std::sqrt(known) : std::numeric_limits<double>::infinity();
@@ -27,7 +27,7 @@ double Landmark::sigma(double min_parallax) const {
 double FeatureWindow::mean_inverse_depth() const {
   double sum = 0.0;
   int n = 0;
-  for (const Landmark& l : landmarks) {
+  for (const FeatureLandmark& l : landmarks) {
     if (!l.has_depth) continue;
     sum += l.rho;
     ++n;
@@ -37,7 +37,7 @@ double FeatureWindow::mean_inverse_depth() const {
 
 int FeatureWindow::num_with_depth() const {
   return static_cast<int>(std::count_if(landmarks.begin(), landmarks.end(),
-                                        [](const Landmark& l) { return l.has_depth; }));
+                                        [](const FeatureLandmark& l) { return l.has_depth; }));
 }
 
 std::vector<WindowPose> FeatureWindow::poses() const {
@@ -49,12 +49,12 @@ std::vector<WindowPose> FeatureWindow::poses() const {
 }
 
 void FeatureWindow::erase_marked() {
-  std::erase_if(landmarks, [](const Landmark& l) { return l.remove; });
+  std::erase_if(landmarks, [](const FeatureLandmark& l) { return l.remove; });
 }
 
 void FeatureWindow::drop_oldest() {
   const std::uint32_t id = keyframes.front().id;
-  for (Landmark& l : landmarks) {
+  for (FeatureLandmark& l : landmarks) {
     l.remove = l.host_id == id;
     std::erase_if(l.observations, [&](const Observation& o) { return o.keyframe_id == id; });
   }
@@ -70,7 +70,7 @@ void FeatureWindow::apply_similarity(double scale) {
     k.T_camera_world = T_world_camera.inverse();
     k.rows.per_row *= scale;
   }
-  for (Landmark& l : landmarks) {
+  for (FeatureLandmark& l : landmarks) {
     l.rho /= scale;
     l.static_sigma /= scale;
     l.information *= scale * scale;

@@ -20,7 +20,7 @@ struct Observation {
 };
 
 /// A corner of a keyframe, its host, and where others saw it.
-struct Landmark {
+struct FeatureLandmark {
   std::uint64_t id = 0;
   std::uint32_t host_id = 0;
   float u = 0.0F, v = 0.0F;  ///< In the host's level 0 [px].
@@ -54,7 +54,7 @@ struct FeatureKeyframe {
 struct FeatureWindow {
   CameraModel camera;  ///< Pinhole without distortion.
   std::vector<FeatureKeyframe> keyframes;
-  std::vector<Landmark> landmarks;
+  std::vector<FeatureLandmark> landmarks;
 
   std::size_t index_of(std::uint32_t keyframe_id) const {
     return keyframe_id - keyframes.front().id;

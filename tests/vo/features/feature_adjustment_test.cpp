@@ -20,7 +20,7 @@ FeatureWindow disturbed(FeatureWindow window, const FeatureAdjuster& adjuster, d
     for (int i = 0; i < 6; ++i) x[i] = size * normal(random);
     window.keyframes[k].T_camera_world = SE3::exp(x) * window.keyframes[k].T_camera_world;
   }
-  for (Landmark& l : window.landmarks) l.rho *= std::exp(5.0 * size * normal(random));
+  for (FeatureLandmark& l : window.landmarks) l.rho *= std::exp(5.0 * size * normal(random));
   return window;
 }
 
@@ -104,7 +104,7 @@ TEST(FeatureAdjuster, OutliersAreMarkedAndPullAtNothingElse) {
   EXPECT_EQ(marked, static_cast<int>(wrong.size()));
   int others = 0;
   int all = 0;
-  for (const Landmark& l : window.landmarks) {
+  for (const FeatureLandmark& l : window.landmarks) {
     all += static_cast<int>(l.observations.size());
     others += static_cast<int>(l.observations.size()) - l.num_inliers();
   }
@@ -119,7 +119,7 @@ TEST(FeatureAdjuster, WhatNoParallaxShowsStaysAsItIs) {
   std::vector<double> before;
   for (FeatureKeyframe& k : window.keyframes) k.T_camera_world.translation().setZero();
   std::mt19937 random(7);
-  for (Landmark& l : window.landmarks) {
+  for (FeatureLandmark& l : window.landmarks) {
     l.static_sigma = 0.02 * l.rho;
     before.push_back(l.rho);
     for (Observation& o : l.observations) {
@@ -141,7 +141,7 @@ TEST(FeatureAdjuster, ALandmarkThatNothingTellsOfStaysAndBreaksNothing) {
   config.depth_damping = 0.0;
   FeatureAdjuster adjuster(config);
   FeatureWindow window = true_window(5, 100, 0.2, 10);
-  Landmark unseen = window.landmarks.front();
+  FeatureLandmark unseen = window.landmarks.front();
   unseen.observations.clear();
   window.landmarks.push_back(unseen);
   EXPECT_TRUE(adjuster.optimize(&window).finite);
@@ -196,7 +196,7 @@ TEST(FeatureWindow, TheOldestKeyframeLeavesWithAllThatHangsOnIt) {
   ASSERT_EQ(window.keyframes.size(), 4U);
   EXPECT_EQ(window.keyframes.front().id, 1U);
   EXPECT_EQ(window.keyframe(3).id, 3U);
-  for (const Landmark& l : window.landmarks) {
+  for (const FeatureLandmark& l : window.landmarks) {
     EXPECT_NE(l.host_id, 0U);
     EXPECT_EQ(l.seen_in(0), nullptr);
   }

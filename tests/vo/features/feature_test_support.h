@@ -28,7 +28,7 @@ inline FeatureWindow true_window(int keyframes, int landmarks, double noise, std
         {static_cast<std::uint32_t>(i), 50'000'000LL * i, nullptr, feature_pose(i), {}});
   }
   for (int n = 0; n < landmarks; ++n) {
-    Landmark l;
+    FeatureLandmark l;
     l.id = static_cast<std::uint64_t>(n);
     l.host_id = static_cast<std::uint32_t>(n % std::max(1, keyframes - 1));
     l.u = static_cast<float>(uniform(random, 20.0, 620.0));

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "sovo/geometry/se3.h"
-#include "sovo/loop/keypoint.h"
+#include "sovo/place/keypoint.h"
 
 namespace sovo {
 

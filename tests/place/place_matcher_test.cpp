@@ -1,15 +1,15 @@
-#include "sovo/loop/place_matcher.h"
+#include "sovo/place/place_matcher.h"
 
 #include <gtest/gtest.h>
 
-#include "loop/loop_test_support.h"
+#include "place/place_test_support.h"
 #include "sovo/geometry/linear_solvers.h"
 
 namespace sovo {
 namespace {
 
 using test::Cloud;
-using test::loop_camera;
+using test::place_camera;
 
 constexpr double kSigmaPx = 0.7;
 
@@ -31,7 +31,7 @@ TEST(PlaceMatcher, FindsTheMotionWithinItsCovariance) {
     const Cloud cloud(150, random);
     const Place a = cloud.seen_from(view(0), kSigmaPx, random);
     const Place b = cloud.seen_from(view(1 + i % 8), kSigmaPx, random);
-    const auto match = match_places(loop_camera(), a, b, {});
+    const auto match = match_places(place_camera(), a, b, {});
     ASSERT_TRUE(match.has_value()) << i;
     EXPECT_GT(match->support, 0.5);
     const Vec6 e = error_of(*match, view(0).inverse() * view(1 + i % 8));
@@ -54,7 +54,7 @@ TEST(PlaceMatcher, HalfOfTheNamesMayBeWrong) {
   for (std::size_t i = 0; i + 1 < half; ++i) {
     std::swap(b.landmarks[i].keypoint.descriptor, b.landmarks[i + 1].keypoint.descriptor);
   }
-  const auto match = match_places(loop_camera(), a, b, {});
+  const auto match = match_places(place_camera(), a, b, {});
   ASSERT_TRUE(match.has_value());
   const Vec6 e = error_of(*match, view(0).inverse() * view(4));
   EXPECT_LT(e.dot(VecX(solve_symmetric(match->covariance, e))), 20.0);
@@ -69,7 +69,7 @@ TEST(PlaceMatcher, NothingBetweenDifferentPlaces) {
     for (std::size_t i = 0; i < 100; ++i) elsewhere.points[i].second = here.points[i].second;
     const Place a = here.seen_from(view(0), kSigmaPx, random);
     const Place b = elsewhere.seen_from(view(0), kSigmaPx, random);
-    EXPECT_FALSE(match_places(loop_camera(), a, b, {}).has_value()) << seed;
+    EXPECT_FALSE(match_places(place_camera(), a, b, {}).has_value()) << seed;
   }
 }
 
@@ -77,8 +77,8 @@ TEST(PlaceMatcher, AFewLandmarksAreNoPlace) {
   std::mt19937 random(4);
   const Cloud cloud(15, random);
   const Place a = cloud.seen_from(view(0), kSigmaPx, random);
-  EXPECT_FALSE(match_places(loop_camera(), a, a, {}).has_value());
-  EXPECT_FALSE(match_places(loop_camera(), a, Place(), {}).has_value());
+  EXPECT_FALSE(match_places(place_camera(), a, a, {}).has_value());
+  EXPECT_FALSE(match_places(place_camera(), a, Place(), {}).has_value());
 }
 
 TEST(PlaceMatcher, DepthsOfOneViewSuffice) {
@@ -90,9 +90,45 @@ TEST(PlaceMatcher, DepthsOfOneViewSuffice) {
   for (std::size_t i = 0; i < b.landmarks.size(); ++i) {
     if (i % 4 != 0) b.landmarks[i].sigma = 0.0F;
   }
-  const auto match = match_places(loop_camera(), a, b, {});
+  const auto match = match_places(place_camera(), a, b, {});
   ASSERT_TRUE(match.has_value());
   EXPECT_GT(match->inliers, static_cast<int>(b.landmarks.size() / 2));
+}
+
+TEST(PlaceMatcher, WhereTheMotionIsExpectedNamesMayRepeat) {
+  std::mt19937 random(12);
+  Cloud cloud(240, random);
+  // Every thing looks like three others that stand elsewhere.
+  for (std::size_t i = 0; i < cloud.points.size(); ++i) {
+    cloud.points[i].second = cloud.points[i % 60].second;
+  }
+  const Place a = cloud.seen_from(view(0), kSigmaPx, random);
+  const Place b = cloud.seen_from(view(3), kSigmaPx, random);
+  const SE3 truth = view(0).inverse() * view(3);
+  EXPECT_FALSE(match_places(place_camera(), a, b, {}).has_value());
+  const SE3 expected = truth * SE3(SO3::exp(Vec3(0.01, 0.01, 0)), Vec3(0.03, 0, 0.05));
+  const auto match = match_places_near(place_camera(), a, b, expected, {});
+  ASSERT_TRUE(match.has_value());
+  const Vec6 e = error_of(*match, truth);
+  EXPECT_LT(e.dot(VecX(solve_symmetric(match->covariance, e))), 20.0);
+}
+
+TEST(PlaceMatcher, WhatMovesAlongCanBeLeftOut) {
+  std::mt19937 random(8);
+  const Cloud world(120, random);
+  const Cloud body(160, random);
+  Place a = world.seen_from(view(0), kSigmaPx, random);
+  Place b = world.seen_from(view(6), kSigmaPx, random);
+  for (Place* place : {&a, &b}) {
+    const Place along = body.seen_from(SE3(), 0.1, random);
+    place->landmarks.insert(place->landmarks.end(), along.landmarks.begin(), along.landmarks.end());
+  }
+  const auto stays = match_places(place_camera(), a, b, {});
+  ASSERT_TRUE(stays.has_value());
+  EXPECT_LT(stays->T_a_b.translation().norm(), 0.01) << "most of what is seen moves along";
+  const auto moves = match_places(place_camera(), a, b, {.min_shift_px = 2.0});
+  ASSERT_TRUE(moves.has_value());
+  EXPECT_LT(error_of(*moves, view(0).inverse() * view(6)).norm(), 0.05);
 }
 
 TEST(PlaceMatcher, TheRefinedMotionIsTheBest) {
@@ -109,13 +145,13 @@ TEST(PlaceMatcher, TheRefinedMotionIsTheBest) {
   }
   ASSERT_GT(pairs.size(), 50U);
   const SE3 truth = view(0).inverse() * view(5);
-  const PlaceMatch best = refine_motion(loop_camera(), pairs, truth, kSigmaPx, 100.0);
+  const PlaceMatch best = refine_motion(place_camera(), pairs, truth, kSigmaPx, 100.0);
   // From elsewhere it leads to the same place.
   for (int k = 0; k < 6; ++k) {
     Vec6 x = Vec6::Zero();
     x[k] = 0.02;
     const PlaceMatch again =
-        refine_motion(loop_camera(), pairs, SE3::exp(x) * truth, kSigmaPx, 100.0);
+        refine_motion(place_camera(), pairs, SE3::exp(x) * truth, kSigmaPx, 100.0);
     EXPECT_LT((again.T_a_b * best.T_a_b.inverse()).log().norm(), 1e-5) << k;
   }
 }

@@ -5,13 +5,13 @@
 #include <vector>
 
 #include "sovo/geometry/camera_model.h"
-#include "sovo/loop/place.h"
+#include "sovo/place/place.h"
 #include "support/cameras.h"
 #include "support/synthetic_scene.h"
 
 namespace sovo::test {
 
-inline CameraModel loop_camera() { return make_camera(640, 480, 450, 455, 318, 241); }
+inline CameraModel place_camera() { return make_camera(640, 480, 450, 455, 318, 241); }
 
 inline BinaryDescriptor random_descriptor(std::mt19937& random) {
   BinaryDescriptor d;
@@ -43,7 +43,7 @@ struct Cloud {
   /// normal number, depths by what a quarter of a pixel of disparity does.
   Place seen_from(const SE3& T_world_camera, double sigma_px, std::mt19937& random) const {
     constexpr double kDisparitySigma = 0.25;
-    const CameraModel camera = loop_camera();
+    const CameraModel camera = place_camera();
     Place place;
     place.T_odom_left = T_world_camera;
     for (const auto& [point, descriptor] : points) {

@@ -3,7 +3,7 @@
 #include <optional>
 
 #include "sovo/geometry/camera_model.h"
-#include "sovo/loop/place.h"
+#include "sovo/place/place.h"
 
 namespace sovo {
 
@@ -13,6 +13,8 @@ struct PlaceMatcherConfig {
   int min_inliers = 25;      ///< Landmarks that agree on one motion, at least.
   double sigma_px = 0.7;     ///< Of a keypoint's position, at its own level.
   int max_hypotheses = 300;  ///< Of RANSAC.
+  /// What lies nearer than this in both images is left out: it may move along with the camera.
+  double min_shift_px = 0.0;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -21,6 +23,8 @@ struct PlaceMatcherConfig {
     v("min_inliers", min_inliers, "landmarks that agree on one motion, at least");
     v("sigma_px", sigma_px, "standard deviation of a keypoint's position [px of its level]");
     v("max_hypotheses", max_hypotheses, "motions that are tried");
+    v("min_shift_px", min_shift_px,
+      "what lies nearer than this in both images may move along, and is left out [px]");
   }
 };
 
@@ -39,6 +43,12 @@ struct PlaceMatch {
 /// both views.
 std::optional<PlaceMatch> match_places(const CameraModel& camera, const Place& a, const Place& b,
                                        const PlaceMatcherConfig& config);
+
+/// The same where about this motion is expected: pairs are sought where it has them, of which more
+/// are right.
+std::optional<PlaceMatch> match_places_near(const CameraModel& camera, const Place& a,
+                                            const Place& b, const SE3& T_a_b,
+                                            const PlaceMatcherConfig& config);
 
 /// A landmark of one view where the other sees it: what `motion_between` fits.
 struct LandmarkPair {

@@ -1,4 +1,4 @@
-#include "sovo/loop/keypoint.h"
+#include "sovo/place/keypoint.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "sovo/loop/place_matcher.h"
+#include "sovo/place/place_matcher.h"
 
 #include <algorithm>
 #include <cmath>
@@ -31,6 +31,12 @@ Nearest nearest(const BinaryDescriptor& descriptor, const std::vector<Landmark>&
   return n;
 }
 
+Vec2 pixel_of(const Landmark& landmark) { return {landmark.keypoint.u, landmark.keypoint.v}; }
+
+bool has_moved(const LandmarkPair& pair, const PlaceMatcherConfig& config) {
+  return (pixel_of(*pair.a) - pixel_of(*pair.b)).norm() >= config.min_shift_px;
+}
+
 /// Pairs whose descriptors are each other's nearest, and clearly so.
 std::vector<LandmarkPair> pair_by_descriptor(const Place& a, const Place& b,
                                              const PlaceMatcherConfig& config) {
@@ -41,12 +47,12 @@ std::vector<LandmarkPair> pair_by_descriptor(const Place& a, const Place& b,
     const Landmark& found = b.landmarks[there.index];
     const Nearest back = nearest(found.keypoint.descriptor, a.landmarks);
     if (&a.landmarks[back.index] != &landmark) continue;
-    if (landmark.has_depth() || found.has_depth()) pairs.push_back({&landmark, &found});
+    const LandmarkPair pair{&landmark, &found};
+    const bool has_depth = landmark.has_depth() || found.has_depth();
+    if (has_depth && has_moved(pair, config)) pairs.push_back(pair);
   }
   return pairs;
 }
-
-Vec2 pixel_of(const Landmark& landmark) { return {landmark.keypoint.u, landmark.keypoint.v}; }
 
 Vec3 bearing(const CameraModel& camera, const Landmark& landmark) {
   return {(landmark.keypoint.u - camera.cx) / camera.fx,
@@ -220,8 +226,7 @@ struct PredictedPairs {
 };
 
 PredictedPairs pair_by_motion(const CameraModel& camera, const Place& a, const Place& b,
-                              const SE3& T_a_b, const PlaceMatcherConfig& config) {
-  constexpr double kReachPx = 6.0;
+                              const SE3& T_a_b, double reach_px, const PlaceMatcherConfig& config) {
   const SE3 T_b_a = T_a_b.inverse();
   PredictedPairs out;
   for (const Landmark& landmark : a.landmarks) {
@@ -229,7 +234,7 @@ PredictedPairs pair_by_motion(const CameraModel& camera, const Place& a, const P
     const auto predicted = camera.project(T_b_a * point_of(camera, landmark));
     if (!predicted || !camera.contains(*predicted)) continue;
     ++out.expected;
-    const double reach = kReachPx * (1 << landmark.keypoint.level);
+    const double reach = reach_px * (1 << landmark.keypoint.level);
     const Landmark* found = nullptr;
     int fewest = config.max_hamming + 1;
     for (const Landmark& other : b.landmarks) {
@@ -239,7 +244,9 @@ PredictedPairs pair_by_motion(const CameraModel& camera, const Place& a, const P
       fewest = bits;
       found = &other;
     }
-    if (found != nullptr) out.pairs.push_back({&landmark, found});
+    if (found == nullptr) continue;
+    const LandmarkPair pair{&landmark, found};
+    if (has_moved(pair, config)) out.pairs.push_back(pair);
   }
   return out;
 }
@@ -271,15 +278,18 @@ PlaceMatch refine_motion(const CameraModel& camera, const std::vector<LandmarkPa
   return match;
 }
 
-std::optional<PlaceMatch> match_places(const CameraModel& camera, const Place& a, const Place& b,
-                                       const PlaceMatcherConfig& config) {
-  const std::vector<LandmarkPair> by_descriptor = pair_by_descriptor(a, b, config);
-  if (static_cast<int>(by_descriptor.size()) < config.min_inliers / 2) return std::nullopt;
-  const auto motion = find_motion(camera, by_descriptor, config);
+namespace {
+
+/// The motion that most of `pairs` agree on, refined with all that it predicts.
+std::optional<PlaceMatch> match_pairs(const CameraModel& camera, const Place& a, const Place& b,
+                                      const std::vector<LandmarkPair>& pairs,
+                                      const PlaceMatcherConfig& config) {
+  constexpr double kReachPx = 6.0;
+  if (static_cast<int>(pairs.size()) < config.min_inliers / 2) return std::nullopt;
+  const auto motion = find_motion(camera, pairs, config);
   if (!motion) return std::nullopt;
-  const PlaceMatch rough =
-      refine_motion(camera, by_descriptor, *motion, config.sigma_px, kRoughSigmas);
-  const auto [by_motion, expected] = pair_by_motion(camera, a, b, rough.T_a_b, config);
+  const PlaceMatch rough = refine_motion(camera, pairs, *motion, config.sigma_px, kRoughSigmas);
+  const auto [by_motion, expected] = pair_by_motion(camera, a, b, rough.T_a_b, kReachPx, config);
   PlaceMatch match = refine_motion(camera, by_motion, rough.T_a_b, config.sigma_px, kFineSigmas);
   match.support = static_cast<double>(match.inliers) / std::max(1, expected);
   // A wrong motion finds a pair here and there; a right one most of what it predicts.
@@ -290,6 +300,21 @@ std::optional<PlaceMatch> match_places(const CameraModel& camera, const Place& a
     return std::nullopt;
   }
   return match;
+}
+
+}  // namespace
+
+std::optional<PlaceMatch> match_places(const CameraModel& camera, const Place& a, const Place& b,
+                                       const PlaceMatcherConfig& config) {
+  return match_pairs(camera, a, b, pair_by_descriptor(a, b, config), config);
+}
+
+std::optional<PlaceMatch> match_places_near(const CameraModel& camera, const Place& a,
+                                            const Place& b, const SE3& T_a_b,
+                                            const PlaceMatcherConfig& config) {
+  constexpr double kReach = 0.06;  // of the image's width
+  const PredictedPairs near = pair_by_motion(camera, a, b, T_a_b, kReach * camera.width, config);
+  return match_pairs(camera, a, b, near.pairs, config);
 }
 
 }  // namespace sovo

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "sovo/vo/motion_model.h"
 
@@ -13,6 +14,16 @@ namespace {
 constexpr std::size_t kSteps = 5;
 constexpr double kWayGoesOn = 2.0;   ///< [s]
 constexpr double kTurnGoesOn = 0.5;  ///< [s]
+
+// How far a camera departs from that: by a share of its way, by accelerations [m/s^2] and by other
+// turns [rad/s]; vehicles usually, and at most.
+constexpr double kUsualShare = 0.1;
+constexpr double kUsualAcceleration = 2.0;
+constexpr double kUsualTurn = 0.3;
+constexpr double kMostShare = 0.25;
+constexpr double kMostAcceleration = 20.0;
+constexpr double kMostTurn = 5.0;
+constexpr double kBlow = 0.2;  ///< [rad]
 
 }  // namespace
 
@@ -46,6 +57,29 @@ SE3 DeadReckoning::since_last(std::int64_t stamp_ns) const {
   const Vec6 rate = usual_rate();
   const SE3 straight_on(SO3(), (since - turning) * rate.head<3>());
   return SE3::exp(turning * rate) * straight_on;
+}
+
+ReckonedPose DeadReckoning::reckon(std::int64_t stamp_ns) const {
+  ReckonedPose out;
+  const SE3 moved = since_last(stamp_ns);
+  out.T_odom_left = last_ * moved;
+  if (rates_.empty()) {
+    out.possible_m = out.possible_rad = std::numeric_limits<double>::infinity();
+    return out;
+  }
+  out.knows_motion = true;
+  const double since = seconds_between(*last_stamp_ns_, stamp_ns);
+  const double way = moved.translation().norm();
+  out.likely_m = kUsualShare * way + 0.5 * kUsualAcceleration * since * since;
+  out.likely_rad = kUsualTurn * since;
+  out.possible_m = kMostShare * way + 0.5 * kMostAcceleration * since * since;
+  out.possible_rad = kBlow + kMostTurn * since;
+  return out;
+}
+
+bool ReckonedPose::is_within(const SE3& T_odom_other, double metres, double radians) const {
+  const SE3 off = T_odom_left.inverse() * T_odom_other;
+  return off.translation().norm() <= metres && off.rotation().log().norm() <= radians;
 }
 
 }  // namespace sovo

@@ -13,6 +13,7 @@
 #include "sovo/odometry/frame_verdict.h"
 #include "sovo/odometry/live_threads.h"
 #include "sovo/odometry/map_segment.h"
+#include "sovo/odometry/recent_places.h"
 #include "sovo/odometry/trajectory_recorder.h"
 
 namespace sovo {
@@ -31,6 +32,7 @@ class StereoOdometry::Impl {
         sink_(sink),
         observer_(observer),
         preparation_(config_, cameras),
+        places_(config_, preparation_),
         pool_(config.threads) {
     if (config.backend == Backend::kFeatures && config.mode == OdometryMode::kStereo) {
       throw std::invalid_argument("the feature-based backend has no static residuals");
@@ -139,20 +141,20 @@ class StereoOdometry::Impl {
 
   void initialize(const StereoFrame& frame, const SideImage* right, OdometryOutput* out) {
     const MonoFrame left = preparation_.prepare_left(frame, observer_, segment_->halvings());
-    if (segment_->initialize(left, right, reckoning_.at(frame.stamp_ns))) {
+    const SE3 T_odom_left = recognize(left, right).value_or(reckoning_.at(frame.stamp_ns));
+    if (segment_->initialize(left, right, T_odom_left)) {
       begin_map(frame, left, out);
       return;
     }
     out->reason = with_exposure(segment_->reason(), frame);
-    if (segment_->wants_halving()) initialize_halved(frame, out);
+    if (segment_->wants_halving()) initialize_halved(frame, T_odom_left, out);
   }
 
   /// What is blurred, noisy or pale at full resolution may be clear enough in smaller images.
-  void initialize_halved(const StereoFrame& frame, OdometryOutput* out) {
+  void initialize_halved(const StereoFrame& frame, const SE3& T_odom_left, OdometryOutput* out) {
     for (int halvings = 1; halvings <= preparation_.max_halvings(); ++halvings) {
       auto segment = new_segment(segment_->index(), halvings);
       const MonoFrame left = preparation_.prepare_left(frame, observer_, halvings);
-      const SE3 T_odom_left = reckoning_.at(frame.stamp_ns);
       if (!segment->initialize_from_stereo(left, frame.right, T_odom_left)) continue;
       const std::string why = segment_->stereo_problem();
       set_segment(std::move(segment));
@@ -248,8 +250,13 @@ class StereoOdometry::Impl {
       const StereoFrame first = *std::exchange(first_frame_, std::nullopt);
       tracked = begin_again(first, frame, tracked);
     }
+    std::optional<SE3> recognized;
     if (map_broke_down() || !tracked.tracking.good) {
-      lose(frame, right, tracked.tracking, out);
+      recognized = recognize(tracked.frame, right);
+      if (recognized && !map_broke_down()) tracked = track_where(*recognized, tracked);
+    }
+    if (map_broke_down() || !tracked.tracking.good) {
+      lose(frame, right, recognized, tracked.tracking, out);
       return;
     }
     failures_ = 0;
@@ -264,6 +271,22 @@ class StereoOdometry::Impl {
              carried(tracked.reference->covariance, tracked.T_world_camera.translation()), out);
     map(std::move(tracked), right);
     judge(t, right_problem, out);
+    if (recognized && out->reason.empty()) out->reason = "found by what the last keyframes saw";
+  }
+
+  /// T_odom_left by what the last keyframes saw.
+  std::optional<SE3> recognize(const MonoFrame& left, const SideImage* right) {
+    if (right == nullptr || places_.empty()) return std::nullopt;
+    if (threads_) threads_->drain();
+    return places_.find(left, *right, segment_->halvings(), right_turn(), reckoning_);
+  }
+
+  /// A frame that does not fit the map where motion leads may do where it is recognized.
+  TrackedFrame track_where(const SE3& T_odom_left, const TrackedFrame& lost) {
+    const SE3 T_current_reference =
+        T_odom_left.inverse() * segment_->vo().reference()->T_world_camera;
+    TrackedFrame found = segment_->track_from(lost.frame, T_current_reference);
+    return found.tracking.good ? found : lost;
   }
 
   /// What goes wrong, and that it is the exposure's fault, if it is.
@@ -278,14 +301,15 @@ class StereoOdometry::Impl {
     return "this frame fits the map only where max_acceleration does not let the camera be";
   }
 
-  void lose(const StereoFrame& frame, const SideImage* right, const FrameTracking& tracking,
-            OdometryOutput* out) {
+  void lose(const StereoFrame& frame, const SideImage* right, const std::optional<SE3>& recognized,
+            const FrameTracking& tracking, OdometryOutput* out) {
     ++failures_;
     out->state = OdometryState::kLost;
     out->pose_valid = false;
     out->reason = with_exposure(why_lost(tracking), frame);
     const bool over = failures_ >= config_.lost_frames || map_broke_down();
-    if ((over || is_left_behind(frame)) && begin_next_segment(frame, right, over)) {
+    const SE3 T_odom_left = recognized.value_or(reckoning_.at(frame.stamp_ns));
+    if ((over || is_left_behind(frame)) && begin_next_segment(frame, right, T_odom_left, over)) {
       out->reason += "; a new segment begins";
     }
   }
@@ -304,11 +328,12 @@ class StereoOdometry::Impl {
 
   /// The next segment begins with this frame, if it can; else, if the one before is `over`, with a
   /// later one.
-  bool begin_next_segment(const StereoFrame& frame, const SideImage* right, bool over) {
+  bool begin_next_segment(const StereoFrame& frame, const SideImage* right, const SE3& T_odom_left,
+                          bool over) {
     if (threads_) threads_->drain();
     auto next = new_segment(next_segment_, 0);
     const MonoFrame left = preparation_.prepare_left(frame, observer_);
-    const bool begun = next->initialize(left, right, reckoning_.at(frame.stamp_ns));
+    const bool begun = next->initialize(left, right, T_odom_left);
     if (!begun && !over) return false;
     end_segment();
     sync_failed_ = false;
@@ -339,7 +364,10 @@ class StereoOdometry::Impl {
   }
 
   void publish_keyframes(const MappingOutcome& outcome) {
-    for (const KeyframeOutput& k : outcome.keyframes) sink_->on_keyframe(k);
+    for (const KeyframeOutput& k : outcome.keyframes) {
+      places_.note(k);
+      sink_->on_keyframe(k);
+    }
     const std::lock_guard lock(map_mutex_);
     map_points_ = static_cast<std::uint32_t>(outcome.map.active_points);
     map_keyframes_ = static_cast<std::uint32_t>(outcome.map.keyframes);
@@ -419,6 +447,7 @@ class StereoOdometry::Impl {
   OutputSink* sink_;
   StageObserver* observer_;
   FramePreparation preparation_;
+  RecentPlaces places_;
   WorkerPool pool_;
 
   std::unique_ptr<MapSegment> segment_;

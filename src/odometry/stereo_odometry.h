@@ -10,6 +10,7 @@
 #include "sovo/image/stereo_frame.h"
 #include "sovo/image/undistorter.h"
 #include "sovo/odometry/odometry_output.h"
+#include "sovo/odometry/recognition_config.h"
 #include "sovo/odometry/stereo_assist.h"
 #include "sovo/scale/right_turn.h"
 #include "sovo/scale/scale_filter.h"
@@ -94,7 +95,8 @@ struct StereoOdometryConfig {
   bool wait_for_mapping = false;  ///< Live: wait instead of dropping.
   int lost_frames = 5;  ///< Frames in a row without a pose after which a new segment begins.
   double max_acceleration = 100.0;  ///< A pose that takes more is none [m/s^2]; 0: any is taken.
-  bool exposure_motion = true;      ///< The motion between a pair's exposures is undone.
+  RecognitionConfig recognition;
+  bool exposure_motion = true;  ///< The motion between a pair's exposures is undone.
   /// Of a rolling shutter, from the upmost row to the lowest; negative where that comes first.
   double readout_ms = 0.0;
   double scale_timeout_s = 3.0;  ///< Without an accepted scale: state SCALE_UNOBSERVED.
@@ -130,6 +132,7 @@ struct StereoOdometryConfig {
     v("max_acceleration", max_acceleration,
       "a pose that takes more since the frames before is none, and of poses that fit alike "
       "one that takes more than a tenth is unlikely [m/s^2]; 0: neither");
+    v("recognition", recognition, "a lost camera finds where it is by what it saw last");
     v("exposure_motion", exposure_motion,
       "cameras that are not triggered together: the motion between the exposures is undone");
     v("readout_ms", readout_ms,

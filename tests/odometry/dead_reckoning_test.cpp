@@ -63,6 +63,37 @@ TEST(DeadReckoning, WhereANewSegmentBeginsIsNoStep) {
   EXPECT_LT(apart(moved.at(22 * kStep), elsewhere * after(0.1)), 1e-9) << "as it moved before";
 }
 
+TEST(DeadReckoning, FartherOffIsPossibleTheLongerItIs) {
+  const DeadReckoning moved = moving(10);
+  const ReckonedPose soon = moved.reckon(11 * kStep);
+  const ReckonedPose late = moved.reckon(29 * kStep);
+  ASSERT_TRUE(soon.knows_motion && late.knows_motion);
+  EXPECT_LT(apart(soon.T_odom_left, after(0.55)), 1e-9);
+  EXPECT_TRUE(soon.is_likely(soon.T_odom_left));
+  // 0.1 s: 0.2 m of way; a second: 2 m.
+  const auto off = [](const ReckonedPose& r, double metres, double radians) {
+    return r.T_odom_left * SE3(SO3::exp(Vec3(0, radians, 0)), Vec3(metres, 0, 0));
+  };
+  EXPECT_TRUE(soon.is_likely(off(soon, 0.02, 0.02)));
+  EXPECT_FALSE(soon.is_likely(off(soon, 0.1, 0.0)));
+  EXPECT_FALSE(soon.is_likely(off(soon, 0.0, 0.1)));
+  EXPECT_TRUE(soon.is_possible(off(soon, 0.1, 0.5)));
+  EXPECT_FALSE(soon.is_possible(off(soon, 1.0, 0.0)));
+  EXPECT_FALSE(soon.is_possible(off(soon, 0.0, 1.0)));
+  EXPECT_TRUE(late.is_likely(off(late, 0.5, 0.2)));
+  EXPECT_TRUE(late.is_possible(off(late, 5.0, 2.0)));
+  EXPECT_FALSE(late.is_possible(off(late, 15.0, 0.0)));
+}
+
+TEST(DeadReckoning, WhereNoMotionIsKnownNothingIsLikelyAndAllIsPossible) {
+  DeadReckoning moved = moving(10);
+  moved.forget_motion();
+  const ReckonedPose open = moved.reckon(12 * kStep);
+  EXPECT_FALSE(open.knows_motion);
+  EXPECT_TRUE(open.is_possible(open.T_odom_left * SE3(SO3(), Vec3(100, 0, 0))));
+  EXPECT_FALSE(open.is_likely(open.T_odom_left * SE3(SO3(), Vec3(0.01, 0, 0))));
+}
+
 TEST(DeadReckoning, StaysWhereNothingIsKnown) {
   DeadReckoning moved;
   EXPECT_LT(apart(moved.at(kStep), SE3()), 1e-12);

@@ -23,7 +23,65 @@ StereoFrame elsewhere(int i) {
   return frame;
 }
 
+/// Where the camera of `turned_frame` is.
+SE3 turned(int i, double yaw) { return drive(i) * SE3(SO3::exp(Vec3(0, yaw, 0)), Vec3::Zero()); }
+
+/// Frame `i` of the drive, of a camera that has turned by `yaw` [rad] meanwhile.
+StereoFrame turned_frame(int i, double yaw) {
+  const SyntheticScene scene(3);
+  const StereoCameras cameras = test_cameras();
+  const SE3 pose = turned(i, yaw);
+  StereoFrame frame = drive_frame(i);
+  frame.left = side_of(scene.render(cameras.rig.left, pose));
+  frame.right = side_of(scene.render(cameras.rig.right, pose * cameras.rig.T_right_left.inverse()));
+  return frame;
+}
+
 }  // namespace
+
+TEST(LostTrack, WhatWasSeenLastTellsWhereACameraIsThatTurnedMeanwhile) {
+  constexpr double kYaw = 0.35;
+  for (const bool deterministic : {true, false}) {
+    StereoOdometryConfig config = test_config();
+    config.deterministic = deterministic;
+    config.wait_for_mapping = true;
+    Playback run(config);
+    run.give_drive(0, 8);
+    const OdometryOutput found = run.give(turned_frame(16, kYaw));
+    EXPECT_TRUE(found.pose_valid) << found.reason;
+    EXPECT_EQ(found.segment, 0U);
+    EXPECT_EQ(found.reason, "found by what the last keyframes saw");
+    const SE3 error = found.T_odom_left.inverse() * drive(0).inverse() * turned(16, kYaw);
+    EXPECT_LT(error.translation().norm(), 0.02);
+    EXPECT_LT(error.rotation().log().norm(), 0.01);
+  }
+}
+
+TEST(LostTrack, WithoutRecognitionSuchATurnIsLost) {
+  StereoOdometryConfig config = test_config();
+  config.recognition.enable = false;
+  Playback run(config);
+  run.give_drive(0, 8);
+  EXPECT_EQ(run.give(turned_frame(16, 0.35)).state, OdometryState::kLost);
+}
+
+TEST(LostTrack, ANewSegmentBeginsWhereItIsRecognized) {
+  constexpr double kYaw = 0.35;
+  for (const bool enable : {true, false}) {
+    StereoOdometryConfig config = test_config();
+    config.recognition.enable = enable;
+    config.lost_frames = 3;
+    Playback run(config);
+    run.give_drive(0, 6);
+    for (int i = 6; i < 9; ++i) run.give(unrelated_frame(i));
+    const OdometryOutput again = run.give(turned_frame(16, kYaw));
+    EXPECT_TRUE(again.pose_valid) << again.reason;
+    EXPECT_EQ(again.segment, 1U);
+    const SE3 error = again.T_odom_left.inverse() * drive(0).inverse() * turned(16, kYaw);
+    EXPECT_EQ(error.translation().norm() < 0.02 && error.rotation().log().norm() < 0.01, enable)
+        << error.translation().norm() << " m, " << error.rotation().log().norm();
+  }
+}
 
 TEST(LostTrack, AfterALossANewSegmentBeginsWhereTheMotionLed) {
   for (const bool deterministic : {true, false}) {

@@ -6,6 +6,7 @@
 #include <thread>
 #include <utility>
 
+#include "sovo/app/calibration_reminder.h"
 #include "sovo/app/commands.h"
 #include "sovo/app/config_options.h"
 #include "sovo/app/failure.h"
@@ -35,14 +36,12 @@ std::int64_t utc_now_ns() {
 /// Frames on their way to the bus.
 class Publication {
  public:
-  using SayAgain = std::function<Result<void>()>;
-  /// `say_calibration`: publishes it again; empty: once is enough.
   Publication(FrameInput& input, bridge::CameraPublisher& publisher, VoFollower& follower,
-              SayAgain say_calibration, StopSignal& stop)
+              CalibrationReminder& calibration, StopSignal& stop)
       : input_(input),
         publisher_(publisher),
         follower_(follower),
-        say_calibration_(std::move(say_calibration)),
+        calibration_(calibration),
         stop_([&stop] { return stop.requested(); }) {}
 
   /// Publishes everything; returns an exit code. `paced`: wait for the odometry.
@@ -77,20 +76,15 @@ class Publication {
     constexpr std::chrono::seconds kPatience(5);
     constexpr std::chrono::milliseconds kSettled(300);
     constexpr std::chrono::milliseconds kSettledWithoutOdometry(2000);
-    constexpr std::chrono::milliseconds kSayAgain(500);
     const auto begin = Clock::now();
     auto changed = begin;
-    auto said = begin;
     std::uint32_t listeners = 0;
     while (!stop_()) {
       const auto now = Clock::now();
       const std::uint32_t found = publisher_.num_readers();
       if (found != listeners) changed = now;
       listeners = found;
-      if (say_calibration_ && !follower_.sees_odometry() && now - said > kSayAgain) {
-        if (auto done = say_calibration_(); !done) spdlog::warn("{}", done.error());
-        said = now;
-      }
+      if (!follower_.sees_odometry()) calibration_.remind();
       const auto settled = follower_.sees_odometry() ? kSettled : kSettledWithoutOdometry;
       if (listeners > 0 && now - changed > settled) return;
       if (listeners == 0 && now - begin > kPatience) {
@@ -104,7 +98,7 @@ class Publication {
   FrameInput& input_;
   bridge::CameraPublisher& publisher_;
   VoFollower& follower_;
-  SayAgain say_calibration_;
+  CalibrationReminder& calibration_;
   std::function<bool()> stop_;
   std::uint64_t last_ = 0;
   std::size_t published_ = 0;
@@ -127,11 +121,8 @@ int publish(const AppConfig& config, const std::function<Result<FrameInput>()>& 
   const std::uint64_t session = random_session();
   auto follower = VoFollower::open(*participant, session);
   if (!follower) return fail(kFailed, follower.error());
-  Publication::SayAgain say_again;
-  if (config.dds.transport == bridge::Transport::kShm) {
-    say_again = [&] { return publisher->publish_static(*participant, cameras, stamp_ns); };
-  }
-  return Publication(*input, *publisher, *follower, std::move(say_again), stop)
+  CalibrationReminder reminder(config.dds.transport, *participant, *publisher, cameras, stamp_ns);
+  return Publication(*input, *publisher, *follower, reminder, stop)
       .run(session, input->rate == 0.0);
 }
 

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <random>
 
+#include "sovo/app/calibration_reminder.h"
 #include "sovo/app/failure.h"
 #include "sovo/app/frame_input.h"
 #include "sovo/app/stop_signal.h"
@@ -71,8 +72,13 @@ void log_summary(const LiveReport& report) {
 class LivePublication {
  public:
   LivePublication(const LiveInput& input, bridge::CameraPublisher& publisher,
-                  bridge::CameraDiagnostics& diagnostics, StopSignal& stop)
-      : source_(*input.source), publisher_(publisher), diagnostics_(diagnostics), stop_(stop) {}
+                  CalibrationReminder& calibration, bridge::CameraDiagnostics& diagnostics,
+                  StopSignal& stop)
+      : source_(*input.source),
+        publisher_(publisher),
+        calibration_(calibration),
+        diagnostics_(diagnostics),
+        stop_(stop) {}
 
   /// `most`: frames after which it ends; 0 for no end.
   int run(int most) {
@@ -82,6 +88,7 @@ class LivePublication {
       source_.want_colour(publisher_.wants_colour());
       SourceResult next = source_.next(std::chrono::milliseconds(100));
       tell();
+      calibration_.remind_new_listeners();
       if (next.state != SourceState::kFrame) continue;
       next.frame.session = session;
       const auto sent = publisher_.publish(next.frame, source_.colour());
@@ -108,6 +115,7 @@ class LivePublication {
 
   LiveSource& source_;
   bridge::CameraPublisher& publisher_;
+  CalibrationReminder& calibration_;
   bridge::CameraDiagnostics& diagnostics_;
   StopSignal& stop_;
   std::vector<CameraLog> logs_;
@@ -126,11 +134,14 @@ int publish_live(const AppConfig& config, const std::function<Result<LiveInput>(
   for (const std::string& note : participant->notes()) spdlog::info("{}", note);
   StereoCameras cameras = to_cameras(input->calibration);
   if (!config.camera.name.empty()) cameras.rig.name = config.camera.name;
-  auto publisher = bridge::CameraPublisher::open(*participant, cameras, read_host_clock().utc_ns);
+  const std::int64_t stamp_ns = read_host_clock().utc_ns;
+  auto publisher = bridge::CameraPublisher::open(*participant, cameras, stamp_ns);
   if (!publisher) return fail(kFailed, publisher.error());
   auto diagnostics = bridge::CameraDiagnostics::open(*participant);
   if (!diagnostics) return fail(kFailed, diagnostics.error());
-  return LivePublication(*input, *publisher, *diagnostics, stop).run(config.camera.frames);
+  CalibrationReminder reminder(config.dds.transport, *participant, *publisher, cameras, stamp_ns);
+  return LivePublication(*input, *publisher, reminder, *diagnostics, stop)
+      .run(config.camera.frames);
 }
 
 }  // namespace sovo::app

@@ -9,6 +9,7 @@ import time
 
 import harness
 from bus_test import FRAMES, BusTest
+from camera_test import CALIBRATION
 from harness import DATASET, FAILED, OK, ROOT, sovo
 
 
@@ -72,7 +73,7 @@ class SharedMemory(BusTest):
         silent = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
         self.assertNotIn("RouDi", silent.stderr)
 
-    def test_images_go_through_it_and_are_recorded_without(self):
+    def start_daemon(self):
         if os.environ.get("SOVO_SANITIZED") == "1":
             self.skipTest("iceoryx's own memory is not for sanitizers")
         try:
@@ -87,6 +88,9 @@ class SharedMemory(BusTest):
                 break
         else:
             self.skipTest("RouDi does not start here; another one may run")
+
+    def test_images_go_through_it_and_are_recorded_without(self):
+        self.start_daemon()
         dive = self.folder / "dive.mcap"
         recorder = self.start("record", "-o", dive, "--min-free", "1MB", *self.SHM)
         self.wait_for_line(recorder.stderr, "recording to")
@@ -107,6 +111,19 @@ class SharedMemory(BusTest):
         recorder.send_signal(signal.SIGINT)
         self.assertIn(" 0 dropped", self.finish(recorder)[1])
         self.expect(sovo("run", "--mcap", dive), OK)
+
+    def test_who_comes_later_is_told_the_calibration_again(self):
+        self.start_daemon()
+        rig = self.folder / "rig.yaml"
+        rig.write_text(CALIBRATION)
+        hears = self.start("topic", "echo", "calibration", "--json")
+        camera = self.start("camera", "v4l2", "--device", "not-there", "--calib", rig, *self.SHM)
+        self.wait_for_line(camera.stderr, "waiting for it")
+        self.wait_for_line(hears.stdout, '"right_from_left"')
+        vo = self.start("vo", *self.SHM)
+        self.wait_for_line(vo.stderr, "through shared memory")
+        for _ in range(3):
+            self.wait_for_line(hears.stdout, '"right_from_left"')
 
 
 if __name__ == "__main__":

@@ -65,6 +65,33 @@ TEST(LostTrack, WithoutRecognitionSuchATurnIsLost) {
   EXPECT_EQ(run.give(turned_frame(16, 0.35)).state, OdometryState::kLost);
 }
 
+TEST(LostTrack, WhatTooFewLandmarksAgreeOnIsNotBelieved) {
+  StereoOdometryConfig config = test_config();
+  config.recognition.min_support = 1.01;
+  Playback run(config);
+  run.give_drive(0, 8);
+  EXPECT_EQ(run.give(turned_frame(16, 0.35)).state, OdometryState::kLost);
+}
+
+TEST(LostTrack, WhereNoMotionIsKnownMoreLandmarksMustAgree) {
+  for (const int lost_inliers : {25, 1000}) {
+    StereoOdometryConfig config = test_config();
+    config.recognition.lost_inliers = lost_inliers;
+    Playback run(config);
+    run.give_drive(0, 1);
+    const OdometryOutput out = run.give(turned_frame(8, 0.35));
+    EXPECT_EQ(out.state == OdometryState::kLost, lost_inliers > 25) << out.reason;
+  }
+}
+
+TEST(LostTrack, NobodyIsWhereNoMotionLeads) {
+  Playback run(test_config());
+  run.give_drive(0, 8);
+  StereoFrame frame = turned_frame(16, 0.35);
+  frame.stamp_ns = drive_frame(8).stamp_ns;  // 0.26 m in one frame, after 0.03 m in each before
+  EXPECT_EQ(run.give(frame).state, OdometryState::kLost);
+}
+
 TEST(LostTrack, ANewSegmentBeginsWhereItIsRecognized) {
   constexpr double kYaw = 0.35;
   for (const bool enable : {true, false}) {

@@ -30,6 +30,10 @@ std::string why_degraded(const StereoOdometryConfig& config, const FrameTracking
     return "only " + std::to_string(static_cast<int>(100.0 * tracking.inlier_ratio)) +
            " % of the " + compared_by(config.backend) + " agree";
   }
+  if (tracking.rest_denied) {
+    return "the camera seems to stand, but much of the image moves: where it sees the vehicle "
+           "itself, hide that with a mask";
+  }
   if (!(sigma <= kDegradedSigma)) return "the image tells too little of where the camera is";
   return "";
 }

@@ -6,16 +6,14 @@
 #include <limits>
 
 #include "sovo/image/interpolation.h"
+#include "sovo/vo/likeness.h"
 
 namespace sovo {
 
 namespace {
 
-constexpr float kMostVotes = 24.0F;    ///< Of a cell; then it keeps half of them.
-constexpr double kLooksTheSame = 0.8;  ///< Correlation of a cell in two keyframes.
-constexpr double kLooksDifferent = 0.5;
-constexpr float kNoise = 0.7F;        ///< Of a pattern, in RMS of what has moved as expected.
-constexpr double kBeyondNoise = 1.5;  ///< RMS of residuals of what has moved as expected.
+constexpr float kMostVotes = 24.0F;  ///< Of a cell; then it keeps half of them.
+constexpr float kNoise = 0.7F;       ///< Of a pattern, in RMS of what has moved as expected.
 constexpr int kChangesToGiveUp = 3;
 constexpr int kSurrounded = 5;      ///< Of the eight cells around.
 constexpr double kMostShare = 0.5;  ///< Of the image; with more, poses are wrong, not the world.
@@ -85,35 +83,6 @@ float best_match(const ImageF& image, const HostGeometry& host, const PossiblePl
     }
   }
   return best;
-}
-
-/// How alike a square of two images is, every second pixel.
-struct Likeness {
-  double correlation = 1.0;  ///< Pearson's; 1 where either does not vary.
-  double difference = 0.0;   ///< RMS, but for its mean [grey levels].
-};
-
-Likeness likeness(const ImageF& a, const ImageF& b, int x0, int y0, int side) {
-  double n = 0.0, sa = 0.0, sb = 0.0, saa = 0.0, sbb = 0.0, sab = 0.0;
-  for (int y = y0; y < std::min(y0 + side, a.height()); y += 2) {
-    for (int x = x0; x < std::min(x0 + side, a.width()); x += 2) {
-      const double va = a.at(x, y);
-      const double vb = b.at(x, y);
-      n += 1.0;
-      sa += va;
-      sb += vb;
-      saa += va * va;
-      sbb += vb * vb;
-      sab += va * vb;
-    }
-  }
-  const double var_a = saa / n - sa * sa / (n * n);
-  const double var_b = sbb / n - sb * sb / (n * n);
-  const double cov = sab / n - sa * sb / (n * n);
-  Likeness out;
-  if (var_a > 0.0 && var_b > 0.0) out.correlation = cov / std::sqrt(var_a * var_b);
-  out.difference = std::sqrt(std::max(0.0, var_a + var_b - 2.0 * cov));
-  return out;
 }
 
 }  // namespace
@@ -222,8 +191,8 @@ void CoMovingCells::compare(const ImageF& before, const ImageF& image, double rm
     if (found_[i] == 0) continue;
     const Likeness l = likeness(before, image, cells_.left(i), cells_.top(i), cells_.side);
     Votes& v = votes_[i];
-    if (l.correlation > kLooksTheSame) v.changed = 0;
-    if (l.correlation < kLooksDifferent && l.difference > kBeyondNoise * rmse) ++v.changed;
+    if (l.is_same()) v.changed = 0;
+    if (l.is_different(rmse)) ++v.changed;
     if (v.changed < kChangesToGiveUp) continue;
     v = {.moves = 1.0F};
     found_[i] = 0;

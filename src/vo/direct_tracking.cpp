@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "sovo/vo/direct_odometry.h"
+#include "sovo/vo/image_change.h"
 #include "sovo/vo/keyframe_policy.h"
 #include "sovo/vo/motion_hypotheses.h"
 #include "sovo/vo/staying_cells.h"
@@ -139,9 +140,9 @@ TrackingResult DirectOdometry::align(const TrackingReference& reference, const M
   return better ? found : likely;
 }
 
-bool DirectOdometry::fits_as_if_at_rest(const TrackingReference& reference,
-                                        const TrackingResult& tracked) const {
-  if (!tracked.good || tracked.inlier_ratio > kFitsWhole) return false;
+bool DirectOdometry::is_at_rest(const TrackingResult& tracked,
+                                const TrackingReference& reference) const {
+  if (!tracked.good) return false;
   const PointMotion motion = motion_of_points(reference.levels[0], tracked.T_current_reference,
                                               std::numeric_limits<double>::infinity());
   return motion.flow_total < kAtRest * pixels_for_one_of_vga(camera_);
@@ -184,16 +185,22 @@ std::optional<TrackingResult> DirectOdometry::align_rest(const TrackingReference
 TrackingResult DirectOdometry::align_whole_or_rest(const TrackingReference& reference,
                                                    const MonoFrame& frame,
                                                    std::shared_ptr<const FrameViews>* views) {
-  const TrackingResult whole = align(reference, frame);
-  if (!config_.co_moving.enable || !fits_as_if_at_rest(reference, whole)) {
+  TrackingResult whole = align(reference, frame);
+  const auto doubts = [&] {
+    if (!config_.co_moving.enable || !is_at_rest(whole, reference)) return false;
+    const ImageChange change = image_change(*reference.pyramid, *frame.pyramid, whole.rmse);
+    whole.rest_denied = denies_rest(change, reference.levels[0]);
+    return whole.inlier_ratio < kFitsWhole || may_deny_rest(change);
+  };
+  if (!doubts()) {
     rest_failed_ = rest_waits_ = 0;
     return whole;
   }
-  if (--rest_waits_ > 0) return whole;
+  if (--rest_waits_ > 0 && !whole.rest_denied) return whole;
   auto view = std::make_shared<CoMovingView>();
-  if (const auto rest = align_rest(reference, frame, whole, &view->cells)) {
+  if (const auto moved = align_rest(reference, frame, whole, &view->cells)) {
     *views = std::move(view);
-    return *rest;
+    return *moved;
   }
   rest_failed_ = std::min(rest_failed_ + 1, kMostFailed);
   rest_waits_ = rest_failed_ < kOftenFailed ? 0 : 1 << (rest_failed_ - kOftenFailed);

@@ -81,6 +81,7 @@ struct FrameTracking {
   double rmse = 0.0;          ///< Residual [grey levels, or px where features are followed].
   double inlier_ratio = 0.0;  ///< Share of what is compared in view that agrees.
   int inliers = 0;
+  bool rest_denied = false;  ///< Fits a camera at rest, while much of the image moves.
 };
 
 /// What a backend keeps of a frame that was tracked until it is mapped.

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "sovo/image/interpolation.h"
+#include "sovo/vo/lower_share.h"
 
 namespace sovo {
 
@@ -13,14 +14,6 @@ namespace {
 constexpr int kFewestPoints = 2;    ///< That make a cell one that stays.
 constexpr double kFarthest = 0.1;   ///< Of what stays, as many points may be farther
 constexpr double kOfTheRest = 0.5;  ///< than this share of the rest.
-
-/// The value that a share of them remain below. Precondition: there are some.
-float quantile(std::vector<float> values, double share) {
-  const auto n = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size()));
-  const auto at = values.begin() + std::min(n, std::ssize(values) - 1);
-  std::nth_element(values.begin(), at, values.end());
-  return *at;
-}
 
 /// Gradient of an image at a pixel that is not at its edge [grey levels/px].
 double gradient_at(const ImageF& image, int x, int y) {
@@ -138,7 +131,7 @@ ChosenCells co_moving_cells(const CoMovingConfig& config, const ImageCells& cell
   }
   ChosenCells chosen(cells.size(), 0);
   if (along.empty() || rest.empty()) return chosen;
-  if (quantile(along, kFarthest) < quantile(rest, kOfTheRest)) return chosen;
+  if (lower_share(along, kFarthest) < lower_share(rest, kOfTheRest)) return chosen;
   for (std::size_t i = 0; i < chosen.size(); ++i) chosen[i] = balance[i] > 0 ? 1 : 0;
   return chosen;
 }

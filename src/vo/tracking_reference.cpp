@@ -282,6 +282,7 @@ TrackingReference build_tracking_reference(const Window& window, std::span<const
   ref.exposure_s = newest.exposure_s;
   ref.affine = newest.affine;
   ref.rows = newest.rows;
+  ref.pyramid = newest.pyramid;
   ref.T_world_camera = newest.T_world_camera();
   ref.levels.resize(static_cast<std::size_t>(num_levels));
 

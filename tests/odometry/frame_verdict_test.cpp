@@ -56,6 +56,13 @@ TEST(FrameVerdict, FewPixelsThatAgreeAreDegraded) {
   EXPECT_EQ(frame.out.reason, "only 45 % of the features agree");
 }
 
+TEST(FrameVerdict, RestBeforeAWorldThatMovesIsDegraded) {
+  Judged frame;
+  frame.tracking.rest_denied = true;
+  EXPECT_EQ(frame.state(), OdometryState::kDegraded);
+  EXPECT_NE(frame.out.reason.find("mask"), std::string::npos);
+}
+
 TEST(FrameVerdict, APlaceThatTheImageDoesNotTellIsDegraded) {
   Judged frame;
   frame.set_sigma(0.022);  // 0.38 % of the mean depth of 10 m, all axes together

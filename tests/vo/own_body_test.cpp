@@ -113,6 +113,29 @@ TEST(OwnBodyInView, IsNothingButTheBodyAndIsLeftOut) {
   }
 }
 
+TEST(OwnBodyInView, AloneDoesNotMakeACameraRest) {
+  WorkerPool pool(1);
+  for (const bool moves : {false, true}) {
+    const Vehicle vehicle;
+    DirectOdometry vo(body_config(), small_camera(), ImageU8(), 0, &pool);
+    const MonoFrame first = vehicle.seen_from(SE3(), 0);
+    std::vector<StartPoint> points;
+    for (const SelectedPixel& pixel : vo.select_pixels(first, 700)) {
+      if (pixel.y >= kBodyEdge) points.push_back({pixel, {kBodyRho, 0.02F * kBodyRho}});
+    }
+    vo.begin(first, SE3(), points, nullptr);
+    for (int i = 1; i <= 12; ++i) {
+      const TrackedFrame tracked = vo.track(vehicle.seen_from(moves ? drive(i) : SE3(), i), 0.0);
+      ASSERT_TRUE(tracked.tracking.good) << i;
+      ASSERT_LT(tracked.T_world_camera.translation().norm(), 0.001) << "it fits the body";
+      // At first little has moved.
+      if (i >= 4) {
+        EXPECT_EQ(tracked.tracking.rest_denied, moves) << i;
+      }
+    }
+  }
+}
+
 TEST(OwnBodyInView, WhatItHidesIsOutOfViewThere) {
   Vehicle vehicle;
   DirectOdometry& vo = vehicle.odometry();

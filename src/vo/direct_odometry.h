@@ -100,6 +100,7 @@ class DirectOdometry final : public MonocularBackend {
                                      std::shared_ptr<const FrameViews>* views);
   TrackingReference as_seen(const TrackingReference& reference, const RowShift& rows,
                             const SE3& T_current_reference) const;
+  /// Whether a pose is that of the reference: its points move by a pixel or so.
   bool is_at_rest(const TrackingResult& tracked, const TrackingReference& reference) const;
   std::optional<TrackingResult> align_rest(const TrackingReference& reference,
                                            const MonoFrame& frame, const TrackingResult& whole,

@@ -18,7 +18,7 @@ struct ImageChange {
 };
 
 /// Compares images of half the size, in which what lies a pixel aside looks alike. `rmse`:
-/// residuals of what is as expected [grey levels].
+/// residuals of what is as expected [grey levels]. Precondition: they are of one size.
 ImageChange image_change(const ImagePyramid& before, const ImagePyramid& image, double rmse);
 
 /// Whether what is different may be the world.

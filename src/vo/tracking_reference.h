@@ -26,8 +26,8 @@ struct TrackingReference : ReferenceKeyframe {
   Affine affine;
   /// Of the last bundle adjustment: `PhotometricProblem::gradient_scatter`.
   double gradient_scatter = 1.0;
-  RowShift rows;  ///< Of its image.
-  ImagePyramidPtr pyramid;
+  RowShift rows;            ///< Of its image.
+  ImagePyramidPtr pyramid;  ///< Of the keyframe.
   std::vector<ReferenceLevel> levels;
   double threshold_share = 1.0;  ///< Of thresholds on brightness, see `WeakTextureConfig`.
   ChosenCells co_moving;  ///< Of the image: seen to move along with the camera; empty: nothing is.

@@ -61,6 +61,16 @@ class Robustness(SimTest):
                                    f"sim.seed={world}", calibration=())
             self.expect_whole(truth, live, 0.03)
 
+    def test_arms_alone_in_haze_do_not_make_a_vehicle_stand_unnoticed(self):
+        # A race through a dark hall: what the lamps show best are the arms that hold them.
+        for seed in (1, 2):
+            truth, live = self.fly("hall", "--trajectory", "race", "--start", 50, "--frames", 40,
+                                   "--seed", seed, "--set", "sim.seed=24", "--set",
+                                   "sim.own_body=arms", "--set", "sim.lamps.count=2", "--set",
+                                   "lighting=vehicle", calibration=(), veil=0.44)
+            if largest_error(live, truth, live[0][0]) > 0.15:
+                self.assertIn("DEGRADED: the camera seems to stand", self.log)
+
     def test_the_light_changes_at_once(self):
         truth, live = self.fly("hall", "--frames", 110, light_factor=0.35, light_from_s=1.5,
                                light_until_s=3)

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <random>
 
 #include "support/pyramids.h"
@@ -16,7 +18,7 @@ constexpr int kViewWidth = 320;
 constexpr int kViewHeight = 192;
 constexpr double kSensorNoise = 2.0;  ///< [grey levels]
 
-/// Random texture of some pixels' grain; the part above `edge` is moved to the side.
+/// Texture of some pixels' grain, and noise; the part above `edge` is moved to the side.
 ImagePyramidPtr view(double shift, int edge, unsigned noise_seed) {
   std::mt19937 random(noise_seed);
   std::normal_distribution<float> noise(0.0F, static_cast<float>(kSensorNoise));
@@ -57,6 +59,37 @@ TEST(ImageChangeTest, OfACameraAtRestIsNone) {
     EXPECT_EQ(rest.share(), 0.0) << shift;
     EXPECT_FALSE(may_deny_rest(rest));
   }
+}
+
+TEST(ImageChangeTest, IsNoneWhereFineTextureLiesAPixelAside) {
+  const auto fine = [](int shift) {
+    ImageF image(kViewWidth, kViewHeight);
+    for (int y = 0; y < kViewHeight; ++y) {
+      for (int x = 0; x < kViewWidth; ++x) {
+        const double grain = 20.0 * std::sin(2.1 * (x + shift));
+        image.at(x, y) =
+            static_cast<float>(120.0 + grain + 17.0 * std::sin(0.3 * (x + shift) + 0.2 * y));
+      }
+    }
+    return pyramid_of(std::move(image));
+  };
+  const ImageChange aside = image_change(*fine(0), *fine(1), kSensorNoise);
+  EXPECT_GT(aside.textured, 50);
+  EXPECT_EQ(aside.share(), 0.0);
+}
+
+TEST(ImageChangeTest, OfFewCellsIsNoneHoweverFewHaveTexture) {
+  const auto corner = [](double shift) {
+    const ImagePyramidPtr textured = view(shift, 32, 1);
+    ImageF image(kViewWidth, kViewHeight);
+    std::fill_n(image.data(), kViewWidth * kViewHeight, 90.0F);
+    for (int y = 0; y < 32; ++y) std::copy_n(textured->level(0).row(y), 96, image.row(y));
+    return pyramid_of(std::move(image));
+  };
+  const ImageChange few = image_change(*corner(0.0), *corner(23.0), kSensorNoise);
+  EXPECT_EQ(few.textured, 3);
+  EXPECT_GT(std::ranges::count(few.different, 1), 0);
+  EXPECT_EQ(few.share(), 0.0);
 }
 
 TEST(ImageChangeTest, IsNoneByOtherLight) {

@@ -34,6 +34,10 @@ std::string why_degraded(const StereoOdometryConfig& config, const FrameTracking
     return "the camera seems to stand, but much of the image moves: where it sees the vehicle "
            "itself, hide that with a mask";
   }
+  if (tracking.motion_denied) {
+    return "the camera seems to move, but much of the image stays in its place: where it sees the "
+           "vehicle itself, hide that with a mask";
+  }
   if (!(sigma <= kDegradedSigma)) return "the image tells too little of where the camera is";
   return "";
 }

@@ -256,11 +256,11 @@ void CoarseTracker::normal_equations(const BrightnessTransfer& transfer, double 
   }
 }
 
-double CoarseTracker::misfits(const TrackingReference& reference, const ImageF& image, const SE3& T,
-                              const BrightnessTransfer& transfer) {
+CoarseTracker::Fit CoarseTracker::fit(const TrackingReference& reference, const ImageF& image,
+                                      const SE3& T, const BrightnessTransfer& transfer) {
   Linearization out;
   residuals(reference.levels[0], image, T, transfer, norm_for(config_, reference), &out);
-  return out.saturated;
+  return {out.saturated, out.energy};
 }
 
 CoarseTracker::Linearization CoarseTracker::linearize(const TrackingReference& reference, int level,

@@ -64,9 +64,13 @@ class CoarseTracker {
                         double exposure_s, const Affine& affine_guess,
                         std::span<const SE3> hypotheses, std::size_t keep);
 
-  /// Share of the points in view at level 0 whose residual exceeds the cutoff.
-  double misfits(const TrackingReference& reference, const ImageF& image,
-                 const SE3& T_current_reference, const BrightnessTransfer& transfer);
+  /// How a motion fits level 0.
+  struct Fit {
+    double misfits = 0.0;  ///< Share of the points in view whose residual exceeds the cutoff.
+    double energy = 0.0;   ///< Robust, mean of a point.
+  };
+  Fit fit(const TrackingReference& reference, const ImageF& image, const SE3& T_current_reference,
+          const BrightnessTransfer& transfer);
 
   /// One linearization for tests: 8x8 normal matrix, gradient and mean energy at a level.
   struct Linearization {

@@ -84,6 +84,7 @@ DirectOdometry::DirectOdometry(const DirectConfig& config, const CameraModel& ca
           ImagePyramid::num_levels_for(camera.width, camera.height, config.tracker.max_levels)),
       window_(camera),
       co_moving_(config.co_moving, camera.width, camera.height),
+      motion_check_(config.co_moving, camera.width, camera.height),
       exposure_(config.motion_blur),
       selector_(selector_config(config.selection, seed)),
       activator_(config.points, config.window, pool),

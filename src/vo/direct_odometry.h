@@ -16,6 +16,7 @@
 #include "sovo/vo/keyframe_policy.h"
 #include "sovo/vo/map_history.h"
 #include "sovo/vo/monocular_backend.h"
+#include "sovo/vo/motion_check.h"
 #include "sovo/vo/motion_model.h"
 #include "sovo/vo/pixel_selector.h"
 #include "sovo/vo/point_activation.h"
@@ -102,8 +103,16 @@ class DirectOdometry final : public MonocularBackend {
                             const SE3& T_current_reference) const;
   /// Whether a pose is that of the reference: its points move by a pixel or so.
   bool is_at_rest(const TrackingResult& tracked, const TrackingReference& reference) const;
+  /// Whether the image speaks against a pose: much of it moves before a camera at rest, or stays
+  /// where it should have moved.
+  bool is_doubtful(const TrackingReference& reference, const MonoFrame& frame,
+                   TrackingResult* whole);
+  MotionEvidence evidence_of(const TrackingReference& reference, const MonoFrame& frame,
+                             const TrackingResult& tracked);
+  /// Aligns anew without what stays in its place, and tells in `co_moving` what should have moved.
+  /// `before` is told that its motion is confirmed where that is found again.
   std::optional<TrackingResult> align_rest(const TrackingReference& reference,
-                                           const MonoFrame& frame, const TrackingResult& whole,
+                                           const MonoFrame& frame, TrackingResult* before,
                                            ChosenCells* co_moving);
   /// Compares a tracked frame with those before it, and notes what the next one is compared with.
   TrackedHistory compare_with_past(const TrackingReference& reference, const MonoFrame& frame,
@@ -118,6 +127,7 @@ class DirectOdometry final : public MonocularBackend {
   // Mapping side.
   Window window_;
   CoMovingCells co_moving_;
+  MotionCheck motion_check_;
   ExposureEstimate exposure_;
   PixelSelector selector_;
   double lasting_share_ = 1.0;  ///< Of the pixels selected last, in view of the next keyframe.
@@ -146,9 +156,10 @@ class DirectOdometry final : public MonocularBackend {
   double first_rmse_ = 0.0;
   std::uint32_t first_rmse_keyframe_ = 0;
   bool has_first_rmse_ = false;
-  int rest_failed_ = 0;    ///< How often in a row another motion of the rest was sought in vain,
-  int rest_waits_ = 0;     ///< and the frames until it is sought again.
-  double sharpest_ = 0.0;  ///< `TrackingResult::sharpness` of the sharpest frame lately.
+  int rest_failed_ = 0;  ///< How often in a row another motion of the rest was sought in vain,
+  int rest_waits_ = 0;   ///< and the frames until it is sought again.
+  bool motion_confirmed_ = false;  ///< Though much stays in its place, when it was sought last.
+  double sharpest_ = 0.0;          ///< `TrackingResult::sharpness` of the sharpest frame lately.
 };
 
 }  // namespace sovo

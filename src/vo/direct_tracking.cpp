@@ -16,11 +16,15 @@ namespace {
 
 constexpr std::size_t kMotionsKept = 4;
 // When a frame fits as if the camera were at rest, but for much of it.
-constexpr double kFitsWhole = 0.9;       ///< Share of points that agree when nothing is amiss.
-constexpr double kAtRest = 1.5;          ///< RMS flow of a camera at rest [px of a VGA image].
-constexpr double kMisfits = 0.3;         ///< Share of the rest that does not agree with that,
-constexpr double kFits = 0.8;            ///< and of it that agrees with its own motion,
-constexpr double kLess = 0.5;            ///< when misfits come down to this share.
+constexpr double kFitsWhole = 0.9;  ///< Share of points that agree when nothing is amiss.
+constexpr double kAtRest = 1.5;     ///< RMS flow of a camera at rest [px of a VGA image].
+constexpr double kMisfits = 0.3;    ///< Share of the rest that does not agree with that,
+constexpr double kFits = 0.8;       ///< and of it that agrees with its own motion,
+constexpr double kLess = 0.5;       ///< when misfits come down to this share.
+// When much agrees better in its place than where the motion takes it.
+constexpr double kFitsBetter = 0.75;     ///< Share of the rest that agrees with another motion,
+constexpr double kLessEnergy = 0.6;      ///< which brings its energy down to this share.
+constexpr double kFitsBadly = 0.85;      ///< With fewer, and hardly any that moved, none does.
 constexpr std::size_t kLeastRest = 100;  ///< Points.
 constexpr int kOftenFailed = 4;          ///< Then frames are left out, the more the oftener,
 constexpr int kMostFailed = 8;           ///< until it is every 16th one that is looked at.
@@ -150,57 +154,91 @@ bool DirectOdometry::is_at_rest(const TrackingResult& tracked,
 
 std::optional<TrackingResult> DirectOdometry::align_rest(const TrackingReference& reference,
                                                          const MonoFrame& frame,
-                                                         const TrackingResult& whole,
+                                                         TrackingResult* before,
                                                          ChosenCells* co_moving) {
   const ImageCells cells(config_.co_moving.cell, camera_.width, camera_.height);
   const ImageF& image = frame.pyramid->level(0);
-  const BrightnessTransfer transfer =
-      brightness_transfer(reference.affine, reference.exposure_s, whole.affine, frame.exposure_s);
-  const ChosenCells staying = staying_cells(config_.co_moving, cells, reference, image, transfer);
+  const auto transfer = [&](const Affine& affine) {
+    return brightness_transfer(reference.affine, reference.exposure_s, affine, frame.exposure_s);
+  };
+  const ChosenCells staying =
+      staying_cells(config_.co_moving, cells, reference, image, transfer(before->affine));
   TrackingReference rest = without(reference, cells, staying);
   const std::size_t points = rest.levels[0].size();
   if (points < kLeastRest) return {};
   rest.mean_rho = std::reduce(rest.levels[0].rho.begin(), rest.levels[0].rho.end(), 0.0) /
                   static_cast<double>(points);
-  const double misfits = tracker_.misfits(rest, image, whole.T_current_reference, transfer);
-  if (misfits < kMisfits) return {};
+  const SE3& T_before = before->T_current_reference;
+  const auto fit = tracker_.fit(rest, image, T_before, transfer(before->affine));
+  const bool moves = before->motion_denied;
+  if (!moves && fit.misfits < kMisfits) return {};
   const auto track = [&](const TrackingReference& against, std::span<const SE3> motions) {
-    return tracker_.track(against, *frame.pyramid, frame.exposure_s, whole.affine, motions, {});
+    return tracker_.track(against, *frame.pyramid, frame.exposure_s, before->affine, motions, {});
   };
   const TrackingResult found = track(
-      rest, tracker_.rank(rest, *frame.pyramid, frame.exposure_s, whole.affine,
-                          unknown_motions(whole.T_current_reference, rest.mean_rho, kUnknownShares),
-                          kMotionsKept));
-  if (!found.good || found.inlier_ratio < std::max(kFits, 1.0 - kLess * misfits)) return {};
-  *co_moving =
-      co_moving_cells(config_.co_moving, cells, reference, found.T_current_reference, staying);
-  if (std::ranges::count(*co_moving, 0) == std::ssize(*co_moving)) return {};
+      rest, tracker_.rank(rest, *frame.pyramid, frame.exposure_s, before->affine,
+                          unknown_motions(T_before, rest.mean_rho, kUnknownShares), kMotionsKept));
+  if (!found.good) return {};
+  const SE3& T_found = found.T_current_reference;
+  if (moves) {
+    before->motion_denied = !is_nearly(T_found, T_before, rest.mean_rho);
+    const auto now = tracker_.fit(rest, image, T_found, transfer(found.affine));
+    if (found.inlier_ratio < kFitsBetter || now.energy > kLessEnergy * fit.energy) return {};
+  } else if (found.inlier_ratio < std::max(kFits, 1.0 - kLess * fit.misfits)) {
+    return {};
+  }
+  *co_moving = co_moving_cells(config_.co_moving, cells, reference, T_found, staying);
+  if (!moves && std::ranges::count(*co_moving, 0) == std::ssize(*co_moving)) return {};
   // What stays in its place since it is far tells of the motion, too.
-  const std::array start = {found.T_current_reference};
-  const TrackingResult out = track(without(reference, cells, *co_moving), start);
+  const TrackingResult out = track(without(reference, cells, *co_moving), std::array{T_found});
   const bool reached = !known_motion_ || is_reachable(*known_motion_, out.T_current_reference);
   return out.good && reached ? std::optional(out) : std::nullopt;
+}
+
+bool DirectOdometry::is_doubtful(const TrackingReference& reference, const MonoFrame& frame,
+                                 TrackingResult* whole) {
+  if (!config_.co_moving.enable || !whole->good) return false;
+  if (is_at_rest(*whole, reference)) {
+    const ImageChange change = image_change(*reference.pyramid, *frame.pyramid, whole->rmse);
+    whole->rest_denied = denies_rest(change, reference.levels[0]);
+    return whole->inlier_ratio < kFitsWhole || may_deny_rest(change);
+  }
+  const MotionEvidence evidence = evidence_of(reference, frame, *whole);
+  whole->motion_denied = evidence.is_doubtful() || evidence.is_missing();
+  return whole->motion_denied;
+}
+
+MotionEvidence DirectOdometry::evidence_of(const TrackingReference& reference,
+                                           const MonoFrame& frame, const TrackingResult& tracked) {
+  return motion_check_.of(reference, frame.pyramid->level(0), tracked.T_current_reference,
+                          brightness_transfer(reference.affine, reference.exposure_s,
+                                              tracked.affine, frame.exposure_s));
 }
 
 TrackingResult DirectOdometry::align_whole_or_rest(const TrackingReference& reference,
                                                    const MonoFrame& frame,
                                                    std::shared_ptr<const FrameViews>* views) {
   TrackingResult whole = align(reference, frame);
-  const auto doubts = [&] {
-    if (!config_.co_moving.enable || !is_at_rest(whole, reference)) return false;
-    const ImageChange change = image_change(*reference.pyramid, *frame.pyramid, whole.rmse);
-    whole.rest_denied = denies_rest(change, reference.levels[0]);
-    return whole.inlier_ratio < kFitsWhole || may_deny_rest(change);
-  };
-  if (!doubts()) {
+  if (!is_doubtful(reference, frame, &whole)) {
     rest_failed_ = rest_waits_ = 0;
+    motion_confirmed_ = false;
     return whole;
   }
-  if (--rest_waits_ > 0 && !whole.rest_denied) return whole;
+  const bool moves = whole.motion_denied;
+  const bool denied = whole.rest_denied || (moves && !motion_confirmed_);
+  if (--rest_waits_ > 0 && !denied) {
+    whole.motion_denied = false;
+    return whole;
+  }
   auto view = std::make_shared<CoMovingView>();
-  if (const auto moved = align_rest(reference, frame, whole, &view->cells)) {
+  if (const auto moved = align_rest(reference, frame, &whole, &view->cells)) {
     *views = std::move(view);
     return *moved;
+  }
+  motion_confirmed_ = moves && !whole.motion_denied;
+  if (whole.motion_denied && whole.inlier_ratio < kFitsBadly &&
+      evidence_of(reference, frame, whole).is_missing()) {
+    whole.good = false;
   }
   rest_failed_ = std::min(rest_failed_ + 1, kMostFailed);
   rest_waits_ = rest_failed_ < kOftenFailed ? 0 : 1 << (rest_failed_ - kOftenFailed);

@@ -82,6 +82,8 @@ struct FrameTracking {
   double inlier_ratio = 0.0;  ///< Share of what is compared in view that agrees.
   int inliers = 0;
   bool rest_denied = false;  ///< Fits a camera at rest, while much of the image moves.
+  /// Much agrees better where it was than where this motion takes it, and no other explains it.
+  bool motion_denied = false;
 };
 
 /// What a backend keeps of a frame that was tracked until it is mapped.

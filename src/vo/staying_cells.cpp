@@ -6,6 +6,7 @@
 
 #include "sovo/image/interpolation.h"
 #include "sovo/vo/lower_share.h"
+#include "sovo/vo/point_transfer.h"
 
 namespace sovo {
 
@@ -34,20 +35,6 @@ InPlace in_place(const ReferenceLevel& level, std::size_t i, const ImageF& image
   const double expected = transfer.gain * static_cast<double>(level.colour[i]) + transfer.bias;
   return {std::abs(static_cast<double>(image.at(x, y)) - expected), gradient_at(image, x, y)};
 }
-
-/// Where a motion moves the points of a level, in homogeneous pixels.
-struct PointTransfer {
-  PointTransfer(const CameraModel& camera, const SE3& T) {
-    const Mat3 K = camera.matrix();
-    KRKi = (K * T.rotation_matrix() * K.inverse()).cast<float>();
-    Kt = (K * T.translation()).cast<float>();
-  }
-  Eigen::Vector3f operator()(const ReferenceLevel& level, std::size_t i) const {
-    return KRKi * Eigen::Vector3f(level.u[i], level.v[i], 1.0F) + level.rho[i] * Kt;
-  }
-  Eigen::Matrix3f KRKi;
-  Eigen::Vector3f Kt;
-};
 
 /// How far a motion moves each point of a level; infinitely those that come to lie behind [px].
 std::vector<float> displacements(const ReferenceLevel& level, const SE3& T) {

@@ -71,6 +71,16 @@ class Robustness(SimTest):
             if largest_error(live, truth, live[0][0]) > 0.15:
                 self.assertIn("DEGRADED: the camera seems to stand", self.log)
 
+    def test_arms_and_a_world_in_haze_are_not_taken_for_one(self):
+        # A way between that of the arms, none, and the true one fits most pixels. The lens darkens
+        # the corners, of which the calibration knows nothing.
+        for seed in (1, 2):
+            truth, live = self.fly("pool", "--frames", 60, "--seed", seed, "--set", "sim.seed=46",
+                                   "--set", "sim.own_body=arms", calibration=(), veil=0.5,
+                                   response_gamma=1.8, vignette=0.4, calibrated="false")
+            self.assertGreaterEqual(len(live), 50)
+            self.assertLess(largest_error(live, truth, live[0][0]), 0.1)
+
     def test_the_light_changes_at_once(self):
         truth, live = self.fly("hall", "--frames", 110, light_factor=0.35, light_from_s=1.5,
                                light_until_s=3)

@@ -63,6 +63,13 @@ TEST(FrameVerdict, RestBeforeAWorldThatMovesIsDegraded) {
   EXPECT_NE(frame.out.reason.find("mask"), std::string::npos);
 }
 
+TEST(FrameVerdict, MotionBeforeAWorldThatStaysIsDegraded) {
+  Judged frame;
+  frame.tracking.motion_denied = true;
+  EXPECT_EQ(frame.state(), OdometryState::kDegraded);
+  EXPECT_NE(frame.out.reason.find("stays in its place"), std::string::npos);
+}
+
 TEST(FrameVerdict, APlaceThatTheImageDoesNotTellIsDegraded) {
   Judged frame;
   frame.set_sigma(0.022);  // 0.38 % of the mean depth of 10 m, all axes together

@@ -22,7 +22,8 @@ DirectConfig body_config() {
 /// A vehicle that sees its own body before a room.
 class Vehicle {
  public:
-  Vehicle() : pool_(1), vo_(body_config(), small_camera(), ImageU8(), 0, &pool_) {
+  explicit Vehicle(int body_edge = kBodyEdge)
+      : body_edge_(body_edge), pool_(1), vo_(body_config(), small_camera(), ImageU8(), 0, &pool_) {
     const MonoFrame first = seen_from(SE3(), 0);
     std::vector<StartPoint> points;
     for (const SelectedPixel& pixel : vo_.select_pixels(first, 700)) {
@@ -52,7 +53,7 @@ class Vehicle {
     ImageF image = frame.pyramid->level(0);
     for (int y = 0; y < image.height(); ++y) {
       for (int x = 0; x < image.width(); ++x) {
-        if (y < kBodyEdge) continue;
+        if (y < body_edge_) continue;
         image.at(x, y) =
             static_cast<float>(110.0 + 40.0 * std::sin(0.5 * x) * std::cos(0.45 * y + 0.1 * x));
       }
@@ -64,13 +65,14 @@ class Vehicle {
  private:
   DepthProposal depth_of(const SelectedPixel& pixel, const SE3& pose) const {
     const Vec2 place(pixel.x, pixel.y);
-    const auto rho = pixel.y >= kBodyEdge
+    const auto rho = pixel.y >= body_edge_
                          ? kBodyRho
                          : static_cast<float>(1.0 / scene_.depth(small_camera(), pose, place));
     return {rho, 0.02F * rho};
   }
 
   SyntheticScene scene_{3};
+  int body_edge_;
   WorkerPool pool_;
   DirectOdometry vo_;
   SE3 pose_;
@@ -110,6 +112,29 @@ TEST(OwnBodyInView, IsNothingButTheBodyAndIsLeftOut) {
   for (std::size_t i = 0; i < level.size(); ++i) EXPECT_FALSE(left_out(level.u[i], level.v[i]));
   for (const SelectedPixel& p : vo.select_pixels(vehicle.seen_from(drive(61), 61), 300)) {
     EXPECT_FALSE(left_out(p.x, p.y));
+  }
+}
+
+TEST(OwnBodyInView, InAsMuchOfTheImageAsTheWorldDoesNotHoldTheCameraBack) {
+  // A way between both, half of the true one, fits nearly all pixels.
+  for (const int edge : {80, 90}) {
+    for (const int speed : {1, 2, 4}) {
+      Vehicle vehicle(edge);
+      bool found = false;
+      for (int i = 1; i <= 12; ++i) {
+        const SE3 truth = drive(speed * i);
+        const TrackedFrame tracked = vehicle.track(truth);
+        ASSERT_TRUE(tracked.tracking.good) << edge << ' ' << speed << ' ' << i;
+        found = found || tracked.views != nullptr;
+        EXPECT_FALSE(found && tracked.tracking.motion_denied);
+        if (i >= 3) {
+          const double off = (tracked.T_world_camera.translation() - truth.translation()).norm();
+          EXPECT_LT(off, 0.025) << edge << ' ' << speed << ' ' << i;
+        }
+        vehicle.map(tracked);
+      }
+      EXPECT_TRUE(found);
+    }
   }
 }
 

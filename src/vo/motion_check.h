@@ -1,0 +1,51 @@
+#pragma once
+
+#include <vector>
+
+#include "sovo/vo/direct_config.h"
+#include "sovo/vo/image_cells.h"
+#include "sovo/vo/tracking_reference.h"
+
+namespace sovo {
+
+/// How an image bears out a motion, in shares of a reference's points.
+struct MotionEvidence {
+  double moved = 0.0;     ///< Agree better where the motion takes them,
+  double in_place = 0.0;  ///< or where they were, as others beside them do.
+  double expected = 0.0;  ///< Are in view, and taken so far that it matters.
+
+  /// As much stays as hardly ever does when a motion is right, but for what moves along.
+  bool is_doubtful() const { return in_place > 0.05; }
+  /// It explains the image hardly better than a camera at rest would. Of right motions two thirds
+  /// of what is expected has moved, on open highways a third in the worst frames.
+  bool is_missing() const { return expected > 0.5 && moved < 0.25 * expected; }
+};
+
+/// Tells a motion that is none of the world's. One between those of two things that an image shows
+/// in parts alike, the vehicle itself and what it moves past, fits both somewhat, and in haze a
+/// wrong one fits nearly everywhere: few residuals are large. But points agree no better than in
+/// their places.
+class MotionCheck {
+ public:
+  MotionCheck(const CoMovingConfig& config, int width, int height);
+
+  /// Points are compared in squares, of those that the motion takes `min_displacement` away or
+  /// more. `transfer`: of brightness, reference to image.
+  MotionEvidence of(const TrackingReference& reference, const ImageF& image,
+                    const SE3& T_current_reference, const BrightnessTransfer& transfer);
+
+ private:
+  struct Sums {
+    float in_place = 0.0F, moved = 0.0F;  ///< Absolute residuals [grey levels].
+    int points = 0;
+  };
+  /// Whether points of a square agree better by one of two sums of absolute residuals.
+  bool agree(const Sums& sums, float residuals, float others) const;
+
+  CoMovingConfig config_;
+  ImageCells cells_;
+  std::vector<Sums> sums_;
+  ChosenCells staying_;
+};
+
+}  // namespace sovo

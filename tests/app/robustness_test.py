@@ -81,6 +81,13 @@ class Robustness(SimTest):
             self.assertGreaterEqual(len(live), 50)
             self.assertLess(largest_error(live, truth, live[0][0]), 0.1)
 
+    def test_a_lorry_that_stays_in_the_image_does_not_make_a_right_motion_doubtful(self):
+        truth, live = self.fly("street", "--trajectory", "expressway", "--reverse", "--frames", 20,
+                               "--set", "sim.seed=30", "--set", "sim.traffic=lorry",
+                               calibration=(), read_noise=3, shot_noise=4)
+        self.expect_whole(truth, live, 0.4)
+        self.assertNotIn("seems to move", self.log)
+
     def test_the_light_changes_at_once(self):
         truth, live = self.fly("hall", "--frames", 110, light_factor=0.35, light_from_s=1.5,
                                light_until_s=3)

@@ -67,7 +67,7 @@ class CoarseTracker {
   /// How a motion fits level 0.
   struct Fit {
     double misfits = 0.0;  ///< Share of the points in view whose residual exceeds the cutoff.
-    double energy = 0.0;   ///< Robust, mean of a point.
+    double energy = 0.0;   ///< Robust, mean of a point [grey levels^2].
   };
   Fit fit(const TrackingReference& reference, const ImageF& image, const SE3& T_current_reference,
           const BrightnessTransfer& transfer);

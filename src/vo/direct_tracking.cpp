@@ -22,9 +22,10 @@ constexpr double kMisfits = 0.3;    ///< Share of the rest that does not agree w
 constexpr double kFits = 0.8;       ///< and of it that agrees with its own motion,
 constexpr double kLess = 0.5;       ///< when misfits come down to this share.
 // When much agrees better in its place than where the motion takes it.
-constexpr double kFitsBetter = 0.75;     ///< Share of the rest that agrees with another motion,
-constexpr double kLessEnergy = 0.6;      ///< which brings its energy down to this share.
-constexpr double kFitsBadly = 0.85;      ///< With fewer, and hardly any that moved, none does.
+constexpr double kFitsBetter = 0.75;  ///< Share of the rest that agrees with another motion,
+constexpr double kLessEnergy = 0.6;   ///< which brings its energy down to this share.
+// With fewer inliers, and hardly any points that moved, the frame does not fit the map.
+constexpr double kFitsBadly = 0.85;
 constexpr std::size_t kLeastRest = 100;  ///< Points.
 constexpr int kOftenFailed = 4;          ///< Then frames are left out, the more the oftener,
 constexpr int kMostFailed = 8;           ///< until it is every 16th one that is looked at.

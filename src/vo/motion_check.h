@@ -39,7 +39,7 @@ class MotionCheck {
     float in_place = 0.0F, moved = 0.0F;  ///< Absolute residuals [grey levels].
     int points = 0;
   };
-  /// Whether points of a square agree better by one of two sums of absolute residuals.
+  /// Whether points of a square agree much better by the first of two sums of absolute residuals.
   bool agree(const Sums& sums, float residuals, float others) const;
 
   CoMovingConfig config_;

@@ -79,6 +79,11 @@ FramePreparation::FramePreparation(const StereoOdometryConfig& config, const Ste
     right_unroller_.emplace(rig.right, rig.right);
   }
   add_resolutions(rig, mask, config.max_halvings);
+  if (config.backend == Backend::kDirect && config.lighting == Lighting::kWorld &&
+      config.vo.vignette.estimate && cameras.left_photometric.vignette.empty() &&
+      cameras.right_photometric.vignette.empty()) {
+    vignette_estimate_ = std::make_unique<VignetteEstimate>(rig.left);
+  }
   left_pyramids_.reserve(images_held(config), rig.left.width, rig.left.height, max_levels_);
 }
 
@@ -172,18 +177,40 @@ void FramePreparation::write_left(const SideImage& left, const Vec3& turn, Image
   }
 }
 
+/// Frames from now on are freed of the vignette as it is known now.
+void FramePreparation::update_vignette() {
+  if (!vignette_estimate_) return;
+  const RadialVignette now = vignette_estimate_->current();
+  if (vignette_ ? now == vignette_->vignette() : !now.any()) return;
+  if (left_off_axis_.empty()) {
+    const OffAxis off_axis(rig().left);
+    left_off_axis_ = off_axis.of(rig().left);
+    right_off_axis_ = off_axis.of(rig().right);
+  }
+  auto free = std::find_if(vignettes_.begin(), vignettes_.end(),
+                           [](const auto& v) { return v.use_count() == 1; });
+  if (free == vignettes_.end()) {
+    free = vignettes_.insert(vignettes_.end(), std::make_shared<VignetteCorrection>());
+  }
+  (*free)->set(now, left_off_axis_, right_off_axis_);
+  vignette_ = *free;
+}
+
 MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver* observer,
                                          int halvings, const Vec6& rate) {
   MonoFrame out;
   out.rate = rate;
   out.rows = row_shift(rate, halvings);
   out.stamp_ns = frame.stamp_ns;
+  update_vignette();
+  out.vignette = vignette_;
   // Without its light an image does not depend on its exposure.
   if (!left_contrast_) out.exposure_s = frame.left.exposure_s;
   auto pyramid = left_pyramids_.take();
   std::optional<ScopedStage> stage(std::in_place, observer, Stage::kUndistortion);
   pyramid->rebuild(max_levels_, [&](ImageF* image) {
     write_left(frame.left, readout_s_ * rate.tail<3>(), image);
+    if (vignette_) vignette_->apply_left(image);
     for (int h = 0; h < halvings; ++h) {
       std::swap(*image, unhalved_left_);
       halve(unhalved_left_, image);
@@ -195,13 +222,14 @@ MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver
   return out;
 }
 
-void FramePreparation::prepare_right(const SideImage& right, int halvings, const Vec6& rate,
+void FramePreparation::prepare_right(const SideImage& right, int halvings, const MonoFrame& left,
                                      ImagePyramid* out) const {
   out->rebuild(max_levels_, [&](ImageF* image) {
     to_float(right, cameras_.right_photometric, downscale_, image);
-    if (right_unroller_ && !rate.isZero(0.0)) {
+    if (left.vignette) left.vignette->apply_right(image);
+    if (right_unroller_ && !left.rate.isZero(0.0)) {
       // Both cameras turn alike, each about its own axes.
-      const Vec3 turn = readout_s_ * (cameras_.rig.T_right_left.rotation() * rate.tail<3>());
+      const Vec3 turn = readout_s_ * (cameras_.rig.T_right_left.rotation() * left.rate.tail<3>());
       ImageF unrolled;
       Unroller::Lattice lattice;
       right_unroller_->apply(*image, turn, &lattice, &unrolled);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -10,8 +11,10 @@
 #include "sovo/image/stereo_frame.h"
 #include "sovo/image/undistorter.h"
 #include "sovo/image/unroller.h"
+#include "sovo/image/vignette.h"
 #include "sovo/odometry/stereo_odometry.h"
 #include "sovo/vo/monocular_backend.h"
+#include "sovo/vo/vignette_estimate.h"
 
 namespace sovo {
 
@@ -45,9 +48,12 @@ class FramePreparation {
                          const Vec6& rate = Vec6::Zero());
 
   /// Right image ready for matching and scale optimization, in the memory of what `out` was before;
-  /// `rate` as for the left one.
-  void prepare_right(const SideImage& right, int halvings, const Vec6& rate,
+  /// rate and vignette are those of the left one.
+  void prepare_right(const SideImage& right, int halvings, const MonoFrame& left,
                      ImagePyramid* out) const;
+
+  /// Null where the vignette is known, or does not matter.
+  VignetteEstimate* vignette_estimate() const { return vignette_estimate_.get(); }
 
   /// Whether rows are exposed one after the other.
   bool has_rolling_shutter() const { return readout_s_ != 0.0; }
@@ -66,6 +72,7 @@ class FramePreparation {
   void add_resolutions(const StereoRig& rig, const ImageU8& mask, int max_halvings);
   void write_left(const SideImage& left, const Vec3& turn, ImageF* image);
   RowShift row_shift(const Vec6& rate, int halvings) const;
+  void update_vignette();
   /// Whether the pixels are resampled as they come, with nothing to be done before.
   bool takes_bytes(const SideImage& left) const;
 
@@ -82,6 +89,11 @@ class FramePreparation {
   ImageF raw_left_;
   ImageF unhalved_left_;
   PyramidPool left_pyramids_;
+  std::unique_ptr<VignetteEstimate> vignette_estimate_;
+  ImageF left_off_axis_, right_off_axis_;  ///< Of each pixel, once there is a vignette.
+  std::shared_ptr<const VignetteCorrection> vignette_;  ///< Of frames that are prepared now.
+  /// That one and those before it; who is held by nobody else is used again.
+  std::vector<std::shared_ptr<VignetteCorrection>> vignettes_;
 };
 
 /// Times a stage and reports it when it goes out of scope.

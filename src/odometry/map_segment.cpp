@@ -76,7 +76,8 @@ MapSegment::MapSegment(const StereoOdometryConfig& config, const FramePreparatio
       halvings_(halvings),
       pool_(pool),
       observer_(observer),
-      vo_(new_backend(config, rig().left, preparation.left_mask(halvings), halvings, pool)),
+      vo_(new_backend(config, rig().left, preparation.left_mask(halvings), halvings, pool,
+                      preparation.vignette_estimate())),
       right_(config.matcher, rig(), right_turn),
       readout_motion_(preparation),
       optimizer_(config.scale, rig()),
@@ -103,7 +104,7 @@ bool MapSegment::initialize(const MonoFrame& frame, const SideImage* right,
 
 ImagePyramidPtr MapSegment::prepare_right(const SideImage& right, const MonoFrame& frame) {
   auto pyramid = right_pyramids_.take();
-  preparation_.prepare_right(right, halvings_, frame.rate, pyramid.get());
+  preparation_.prepare_right(right, halvings_, frame, pyramid.get());
   return pyramid;
 }
 

@@ -4,6 +4,7 @@
 
 #include "sovo/odometry/stereo_odometry.h"
 #include "sovo/vo/monocular_backend.h"
+#include "sovo/vo/vignette_estimate.h"
 #include "sovo/vo/worker_pool.h"
 
 namespace sovo {
@@ -12,6 +13,7 @@ namespace sovo {
 /// `halvings` times. `mask`: 0 where they must not be used; may be empty.
 std::unique_ptr<MonocularBackend> new_backend(const StereoOdometryConfig& config,
                                               const CameraModel& camera, const ImageU8& mask,
-                                              int halvings, WorkerPool* pool);
+                                              int halvings, WorkerPool* pool,
+                                              VignetteEstimate* vignette);
 
 }  // namespace sovo

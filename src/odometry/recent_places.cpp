@@ -72,7 +72,7 @@ std::optional<SE3> RecentPlaces::find(const MonoFrame& left, const SideImage& ri
   const SE3 turn = T_right_left.inverse() * SE3(right_turn, Vec3::Zero()) * T_right_left;
   const SE3 T_later_odom = reckoning.at(left.stamp_ns + right.stamp_offset_ns).inverse();
   auto right_pyramid = std::make_shared<ImagePyramid>();
-  preparation_.prepare_right(right, halvings, left.rate, right_pyramid.get());
+  preparation_.prepare_right(right, halvings, left, right_pyramid.get());
   Place here;
   here.landmarks = landmarks({left.pyramid, std::move(right_pyramid),
                               turn * T_later_odom * reckoning.at(left.stamp_ns), halvings,

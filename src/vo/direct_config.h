@@ -242,6 +242,16 @@ struct MotionBlurConfig {
   }
 };
 
+/// The vignette of a camera whose calibration has none.
+struct VignetteConfig {
+  bool estimate = true;
+
+  template <class Visitor>
+  void visit(Visitor& v) {
+    v("estimate", estimate, "find it out while flying, where the calibration has none");
+  }
+};
+
 struct DirectConfig {
   TrackerConfig tracker;
   KeyframeConfig keyframe;
@@ -251,6 +261,7 @@ struct DirectConfig {
   WeakTextureConfig weak_texture;
   CoMovingConfig co_moving;
   MotionBlurConfig motion_blur;
+  VignetteConfig vignette;
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -262,6 +273,7 @@ struct DirectConfig {
     v("weak_texture", weak_texture, "thresholds on brightness of images with little texture");
     v("co_moving", co_moving, "what moves along with the camera");
     v("motion_blur", motion_blur, "motion blur that keyframes do not share");
+    v("vignette", vignette, "loss of light towards the corners");
   }
 };
 

@@ -33,6 +33,7 @@ std::unique_ptr<Keyframe> new_keyframe(std::uint32_t id, const MonoFrame& frame,
   k->stamp_ns = frame.stamp_ns;
   k->exposure_s = frame.exposure_s;
   k->pyramid = frame.pyramid;
+  if (frame.vignette) k->vignette = frame.vignette->vignette();
   k->rows = frame.rows;
   k->velocity = frame.velocity;
   k->frozen_T_camera_world = T_world_camera.inverse();
@@ -75,7 +76,8 @@ Point start_point(const ImmaturePoint& immature, const DepthProposal& depth) {
 }  // namespace
 
 DirectOdometry::DirectOdometry(const DirectConfig& config, const CameraModel& camera,
-                               const ImageU8& mask, int seed, WorkerPool* pool)
+                               const ImageU8& mask, int seed, WorkerPool* pool,
+                               VignetteEstimate* vignette)
     : config_(config),
       camera_(camera),
       mask_(mask),
@@ -86,6 +88,7 @@ DirectOdometry::DirectOdometry(const DirectConfig& config, const CameraModel& ca
       co_moving_(config.co_moving, camera.width, camera.height),
       motion_check_(config.co_moving, camera.width, camera.height),
       exposure_(config.motion_blur),
+      vignette_(vignette),
       selector_(selector_config(config.selection, seed)),
       activator_(config.points, config.window, pool),
       adjuster_(config.window, pool),
@@ -269,6 +272,8 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
       !result.bundle.finite || result.bundle.rmse > kMaxBundleRmse || result.bundle.residuals < 100;
   if (result.failed) return result;
 
+  const bool doubtful = tracked.tracking.motion_denied || tracked.tracking.rest_denied;
+  if (vignette_ != nullptr && !doubtful) vignette_->observe(window_);
   history_.extend_covariance(k.T_world_camera(), result.bundle.newest_covariance);
   gradient_scatter_ = result.bundle.gradient_scatter;
   for (int h = 0; h < window_.size(); ++h) {

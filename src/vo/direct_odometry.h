@@ -20,6 +20,7 @@
 #include "sovo/vo/motion_model.h"
 #include "sovo/vo/pixel_selector.h"
 #include "sovo/vo/point_activation.h"
+#include "sovo/vo/vignette_estimate.h"
 #include "sovo/vo/window.h"
 #include "sovo/vo/worker_pool.h"
 
@@ -30,8 +31,9 @@ namespace sovo {
 class DirectOdometry final : public MonocularBackend {
  public:
   /// `camera`: pinhole without distortion. `mask`: 0 where pixels must not be used (may be empty).
+  /// `vignette` is told what keyframes show of it; may be null.
   DirectOdometry(const DirectConfig& config, const CameraModel& camera, const ImageU8& mask,
-                 int seed, WorkerPool* pool);
+                 int seed, WorkerPool* pool, VignetteEstimate* vignette = nullptr);
 
   void use_static_residuals(const StereoRig& rig) override { window_.set_rig(rig); }
   int wanted_points() const override { return config_.points.active_points; }
@@ -129,6 +131,7 @@ class DirectOdometry final : public MonocularBackend {
   CoMovingCells co_moving_;
   MotionCheck motion_check_;
   ExposureEstimate exposure_;
+  VignetteEstimate* vignette_;
   PixelSelector selector_;
   double lasting_share_ = 1.0;  ///< Of the pixels selected last, in view of the next keyframe.
   PointActivator activator_;

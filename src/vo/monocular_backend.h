@@ -10,6 +10,7 @@
 #include "sovo/geometry/row_shift.h"
 #include "sovo/geometry/stereo_rig.h"
 #include "sovo/image/pyramid.h"
+#include "sovo/image/vignette.h"
 #include "sovo/vo/brightness.h"
 #include "sovo/vo/bundle_result.h"
 #include "sovo/vo/keyframe_poses.h"
@@ -23,6 +24,7 @@ struct MonoFrame {
   std::int64_t stamp_ns = 0;
   double exposure_s = 0.0;  ///< 0: unknown.
   ImagePyramidPtr pyramid;
+  std::shared_ptr<const VignetteCorrection> vignette;  ///< That it is freed of; null: none.
   /// Of a rolling shutter: how the camera moved while the image was read out, log(T_later_earlier)
   /// a second (translation, rotation), as its images were prepared with. What it turned is undone.
   Vec6 rate = Vec6::Zero();

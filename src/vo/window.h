@@ -11,6 +11,7 @@
 #include "sovo/geometry/se3.h"
 #include "sovo/geometry/stereo_rig.h"
 #include "sovo/image/pyramid.h"
+#include "sovo/image/vignette.h"
 #include "sovo/vo/brightness.h"
 #include "sovo/vo/immature_point.h"
 #include "sovo/vo/motion_blur.h"
@@ -79,6 +80,7 @@ struct Keyframe {
   std::int64_t stamp_ns = 0;
   double exposure_s = 0.0;
   ImagePyramidPtr pyramid;
+  RadialVignette vignette;              ///< That it is freed of, as far as it was known.
   ImagePyramidPtr right;                ///< Raw; null: no static residuals.
   SE3 T_later_left;                     ///< This camera into where it was when `right` was exposed.
   BrightnessTransfer right_brightness;  ///< From this keyframe's image to `right`.

@@ -61,6 +61,14 @@ class Robustness(SimTest):
                                    f"sim.seed={world}", calibration=())
             self.expect_whole(truth, live, 0.03)
 
+    def test_darkened_corners_over_bare_sand(self):
+        # They stay, and are stronger than anything in the sand.
+        dark = {"vignette": 0.4, "calibrated": "false"}
+        for world, direction in ((1, ()), (7, ("--reverse",))):
+            options = ("--frames", 120, *direction, "--set", f"sim.seed={world}")
+            truth, live = self.fly("sand", *options, calibration=(), **dark)
+            self.expect_whole(truth, live, 0.03)
+
     def test_arms_alone_in_haze_do_not_make_a_vehicle_stand_unnoticed(self):
         # A race through a dark hall: what the lamps show best are the arms that hold them.
         for seed in (1, 2):

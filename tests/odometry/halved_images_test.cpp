@@ -41,8 +41,8 @@ TEST(HalvedImages, AreThePyramidsLevelsOfTheWholeOnes) {
   const MonoFrame whole = preparation.prepare_left(frame, nullptr, 0);
   const MonoFrame half = preparation.prepare_left(frame, nullptr, 1);
   ImagePyramid right, right_half;
-  preparation.prepare_right(frame.right, 0, Vec6::Zero(), &right);
-  preparation.prepare_right(frame.right, 1, Vec6::Zero(), &right_half);
+  preparation.prepare_right(frame.right, 0, whole, &right);
+  preparation.prepare_right(frame.right, 1, whole, &right_half);
   const auto same = [](const ImageF& a, const ImageF& b) {
     return a.width() == b.width() && a.height() == b.height() &&
            std::equal(a.data(), a.data() + a.size(), b.data());
@@ -52,7 +52,7 @@ TEST(HalvedImages, AreThePyramidsLevelsOfTheWholeOnes) {
   EXPECT_EQ(half.pyramid->level(0).width(), preparation.rig(1).left.width);
   EXPECT_EQ(right_half.level(0).height(), preparation.rig(1).right.height);
   // The whole images again, in memory that was halved ones'.
-  preparation.prepare_right(frame.right, 0, Vec6::Zero(), &right_half);
+  preparation.prepare_right(frame.right, 0, whole, &right_half);
   EXPECT_EQ(right_half.num_levels(), right.num_levels());
   EXPECT_TRUE(same(right_half.level(0), right.level(0)));
   const ImageF copy = whole.pyramid->level(0);

@@ -177,6 +177,16 @@ void FramePreparation::write_left(const SideImage& left, const Vec3& turn, Image
   }
 }
 
+std::shared_ptr<VignetteCorrection> FramePreparation::free_vignette() {
+  for (const auto& held : vignettes_) {
+    // Counting this copy is what makes the last reader's use of it happen before ours.
+    std::shared_ptr<VignetteCorrection> vignette = held;
+    if (vignette.use_count() == 2) return vignette;
+  }
+  vignettes_.push_back(std::make_shared<VignetteCorrection>());
+  return vignettes_.back();
+}
+
 /// Frames from now on are freed of the vignette as it is known now.
 void FramePreparation::update_vignette() {
   if (!vignette_estimate_) return;
@@ -187,13 +197,9 @@ void FramePreparation::update_vignette() {
     left_off_axis_ = off_axis.of(rig().left);
     right_off_axis_ = off_axis.of(rig().right);
   }
-  auto free = std::find_if(vignettes_.begin(), vignettes_.end(),
-                           [](const auto& v) { return v.use_count() == 1; });
-  if (free == vignettes_.end()) {
-    free = vignettes_.insert(vignettes_.end(), std::make_shared<VignetteCorrection>());
-  }
-  (*free)->set(now, left_off_axis_, right_off_axis_);
-  vignette_ = *free;
+  const std::shared_ptr<VignetteCorrection> next = free_vignette();
+  next->set(now, left_off_axis_, right_off_axis_);
+  vignette_ = next;
 }
 
 MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver* observer,

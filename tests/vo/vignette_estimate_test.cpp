@@ -37,11 +37,12 @@ class Sights {
 
  private:
   VignetteSight sight(const RadialVignette& known, double brightness) {
-    const double from = share_(random_);
-    const double to = std::clamp(from + 0.3 * centred(random_), 0.0, 1.0);
     VignetteSight s;
-    s.basis = basis_at(to) - basis_at(from);
     s.quarter = static_cast<int>(4.0 * share_(random_)) % 4;
+    const double from = share_(random_);
+    const double outwards = road > 0.0 && s.quarter == 1 ? 0.15 : 0.0;  // it comes nearer
+    const double to = std::clamp(from + outwards + 0.3 * centred(random_), 0.0, 1.0);
+    s.basis = basis_at(to) - basis_at(from);
     s.log_known = known.log_at(to) - known.log_at(from);
     const double whole = truth_.log_at(to) - truth_.log_at(from);
     s.log_ratio = seen * (whole - s.log_known) + brightness + noise * normal_(random_);

@@ -67,6 +67,10 @@ std::string run_summary(const ProfileCollector& profile, const RunCounts& counts
     text += fmt::format("loops closed     {} (places {}, views matched {}, impossible {})\n",
                         loops->closures, loops->places, loops->matched, loops->refused);
   }
+  if (counts.corner_light < 1.0) {
+    text +=
+        fmt::format("light in corners {:.2f} (the vignette that was found)\n", counts.corner_light);
+  }
   text += fmt::format("time a frame     {:.2f} ms\n", frame_ms);
   text += "scale verdicts   ";
   if (counts.verdicts.empty()) text += "none";

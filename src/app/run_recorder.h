@@ -20,7 +20,8 @@ struct RunCounts {
   std::uint64_t dropped = 0;                      ///< Frames that mapping had no time for.
   std::uint32_t queue_depth = 0;                  ///< Frames that wait for mapping.
   std::map<std::string, std::uint64_t> verdicts;  ///< Scale optimizations by verdict.
-  std::string state;                              ///< Of the newest frame.
+  double corner_light = 1.0;                      ///< Of the newest frame.
+  std::string state;                              ///< And its state.
   /// Completion: frames with a valid pose / frames fed.
   double completion() const {
     return fed == 0 ? 0.0 : static_cast<double>(tracked) / static_cast<double>(fed);

@@ -44,6 +44,7 @@ DiagnosticReport describe(const std::string& process_name, const OdometryOutput&
       {"rejected", std::to_string(output.rejected + feed.rejected)},
       {"segment", std::to_string(output.segment)},
       {"halvings", std::to_string(output.halvings)},
+      {"corner_light", std::to_string(output.corner_light)},
       {"right_turn_deg", in_degrees(output.right_turn)},
       {"co_moving_share", std::to_string(output.co_moving_share)},
       {"points", std::to_string(output.points)},

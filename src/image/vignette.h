@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "sovo/geometry/camera_model.h"
 #include "sovo/image/image.h"
@@ -38,22 +39,18 @@ struct RadialVignette {
   bool operator==(const RadialVignette&) const = default;
 };
 
-/// Images of both cameras freed of a vignette.
+/// Frees images of a camera of a vignette.
 class VignetteCorrection {
  public:
-  /// `left`, `right`: `OffAxis` of each pixel. Allocates nothing for images of the size of the last
-  /// ones.
-  void set(const RadialVignette& vignette, const ImageF& left, const ImageF& right);
+  /// `off_axis`: `OffAxis` of each pixel.
+  explicit VignetteCorrection(ImageF off_axis) : off_axis_(std::move(off_axis)) {}
 
-  const RadialVignette& vignette() const { return vignette_; }
-  void apply_left(ImageF* image) const { multiply(left_, image); }
-  void apply_right(ImageF* image) const { multiply(right_, image); }
+  /// Divides every pixel by V. Nothing of it is kept from image to image, so that V may change at
+  /// any time. Precondition: `image` has the size of `off_axis`, log V is -2 at least.
+  void apply(const RadialVignette& vignette, ImageF* image) const;
 
  private:
-  static void multiply(const ImageF& gains, ImageF* image);
-
-  RadialVignette vignette_;
-  ImageF left_, right_;  ///< 1 / V.
+  ImageF off_axis_;
 };
 
 }  // namespace sovo

@@ -83,6 +83,9 @@ FramePreparation::FramePreparation(const StereoOdometryConfig& config, const Ste
       config.vo.vignette.estimate && cameras.left_photometric.vignette.empty() &&
       cameras.right_photometric.vignette.empty()) {
     vignette_estimate_ = std::make_unique<VignetteEstimate>(rig.left);
+    const OffAxis off_axis(rig.left);
+    left_vignette_.emplace(off_axis.of(rig.left));
+    right_vignette_.emplace(off_axis.of(rig.right));
   }
   left_pyramids_.reserve(images_held(config), rig.left.width, rig.left.height, max_levels_);
 }
@@ -177,29 +180,8 @@ void FramePreparation::write_left(const SideImage& left, const Vec3& turn, Image
   }
 }
 
-std::shared_ptr<VignetteCorrection> FramePreparation::free_vignette() {
-  for (const auto& held : vignettes_) {
-    // Counting this copy is what makes the last reader's use of it happen before ours.
-    std::shared_ptr<VignetteCorrection> vignette = held;
-    if (vignette.use_count() == 2) return vignette;
-  }
-  vignettes_.push_back(std::make_shared<VignetteCorrection>());
-  return vignettes_.back();
-}
-
-/// Frames from now on are freed of the vignette as it is known now.
-void FramePreparation::update_vignette() {
-  if (!vignette_estimate_) return;
-  const RadialVignette now = vignette_estimate_->current();
-  if (vignette_ ? now == vignette_->vignette() : !now.any()) return;
-  if (left_off_axis_.empty()) {
-    const OffAxis off_axis(rig().left);
-    left_off_axis_ = off_axis.of(rig().left);
-    right_off_axis_ = off_axis.of(rig().right);
-  }
-  const std::shared_ptr<VignetteCorrection> next = free_vignette();
-  next->set(now, left_off_axis_, right_off_axis_);
-  vignette_ = next;
+double FramePreparation::corner_light() const {
+  return vignette_estimate_ ? std::exp(vignette_estimate_->current().log_at(1.0)) : 1.0;
 }
 
 MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver* observer,
@@ -208,15 +190,14 @@ MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver
   out.rate = rate;
   out.rows = row_shift(rate, halvings);
   out.stamp_ns = frame.stamp_ns;
-  update_vignette();
-  out.vignette = vignette_;
+  if (vignette_estimate_) out.vignette = vignette_estimate_->current();
   // Without its light an image does not depend on its exposure.
   if (!left_contrast_) out.exposure_s = frame.left.exposure_s;
   auto pyramid = left_pyramids_.take();
   std::optional<ScopedStage> stage(std::in_place, observer, Stage::kUndistortion);
   pyramid->rebuild(max_levels_, [&](ImageF* image) {
     write_left(frame.left, readout_s_ * rate.tail<3>(), image);
-    if (vignette_) vignette_->apply_left(image);
+    if (out.vignette.any()) left_vignette_->apply(out.vignette, image);
     for (int h = 0; h < halvings; ++h) {
       std::swap(*image, unhalved_left_);
       halve(unhalved_left_, image);
@@ -232,7 +213,7 @@ void FramePreparation::prepare_right(const SideImage& right, int halvings, const
                                      ImagePyramid* out) const {
   out->rebuild(max_levels_, [&](ImageF* image) {
     to_float(right, cameras_.right_photometric, downscale_, image);
-    if (left.vignette) left.vignette->apply_right(image);
+    if (left.vignette.any()) right_vignette_->apply(left.vignette, image);
     if (right_unroller_ && !left.rate.isZero(0.0)) {
       // Both cameras turn alike, each about its own axes.
       const Vec3 turn = readout_s_ * (cameras_.rig.T_right_left.rotation() * left.rate.tail<3>());

@@ -55,6 +55,9 @@ class FramePreparation {
   /// Null where the vignette is known, or does not matter.
   VignetteEstimate* vignette_estimate() const { return vignette_estimate_.get(); }
 
+  /// OdometryOutput::corner_light.
+  double corner_light() const;
+
   /// Whether rows are exposed one after the other.
   bool has_rolling_shutter() const { return readout_s_ != 0.0; }
   /// How far apart what is `rho` [1/m] near lies in images that are prepared with rates that differ
@@ -72,8 +75,6 @@ class FramePreparation {
   void add_resolutions(const StereoRig& rig, const ImageU8& mask, int max_halvings);
   void write_left(const SideImage& left, const Vec3& turn, ImageF* image);
   RowShift row_shift(const Vec6& rate, int halvings) const;
-  std::shared_ptr<VignetteCorrection> free_vignette();
-  void update_vignette();
   /// Whether the pixels are resampled as they come, with nothing to be done before.
   bool takes_bytes(const SideImage& left) const;
 
@@ -91,10 +92,7 @@ class FramePreparation {
   ImageF unhalved_left_;
   PyramidPool left_pyramids_;
   std::unique_ptr<VignetteEstimate> vignette_estimate_;
-  ImageF left_off_axis_, right_off_axis_;  ///< Of each pixel, once there is a vignette.
-  std::shared_ptr<const VignetteCorrection> vignette_;  ///< Of frames that are prepared now.
-  /// That one and those before it; who is held by nobody else is used again.
-  std::vector<std::shared_ptr<VignetteCorrection>> vignettes_;
+  std::optional<VignetteCorrection> left_vignette_, right_vignette_;  ///< With an estimate.
 };
 
 /// Times a stage and reports it when it goes out of scope.

@@ -79,7 +79,10 @@ struct OdometryOutput {
   std::uint64_t dropped_queue = 0;  ///< Frames dropped because mapping or tracking was late.
   std::uint64_t rejected = 0;       ///< Frames refused (bad stamp, size, content).
   std::uint32_t reset_counter = 0;
-  int halvings = 0;                ///< How often images are halved to be tracked.
+  int halvings = 0;  ///< How often images are halved to be tracked.
+  /// The share of its light that the lens lets through in the farthest corner of the tracked image,
+  /// as it was found out while flying; 1 where the calibration has a vignette.
+  double corner_light = 1.0;
   bool decalibrated = false;       ///< The right camera is turned against its calibration.
   Vec3 right_turn = Vec3::Zero();  ///< And by this, about its own axes, which is undone [rad].
   double co_moving_share = 0.0;    ///< Of the image: moves along with the camera, and is left out.

@@ -305,7 +305,6 @@ class StereoOdometry::Impl {
             const FrameTracking& tracking, OdometryOutput* out) {
     ++failures_;
     out->state = OdometryState::kLost;
-    out->pose_valid = false;
     out->reason = with_exposure(why_lost(tracking), frame);
     const bool over = failures_ >= config_.lost_frames || map_broke_down();
     const SE3 T_odom_left = recognized.value_or(reckoning_.at(frame.stamp_ns));
@@ -390,6 +389,7 @@ class StereoOdometry::Impl {
     out->reset_counter = reset_counter_;
     out->segment = segment_->index();
     out->halvings = segment_->halvings();
+    out->corner_light = preparation_.corner_light();
     out->distance_m = distance_;
     out->queue_depth = threads_ ? static_cast<std::uint32_t>(threads_->queue_depth()) : 0;
     const std::lock_guard lock(map_mutex_);

@@ -33,7 +33,7 @@ std::unique_ptr<Keyframe> new_keyframe(std::uint32_t id, const MonoFrame& frame,
   k->stamp_ns = frame.stamp_ns;
   k->exposure_s = frame.exposure_s;
   k->pyramid = frame.pyramid;
-  if (frame.vignette) k->vignette = frame.vignette->vignette();
+  k->vignette = frame.vignette;
   k->rows = frame.rows;
   k->velocity = frame.velocity;
   k->frozen_T_camera_world = T_world_camera.inverse();

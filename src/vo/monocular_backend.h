@@ -24,7 +24,7 @@ struct MonoFrame {
   std::int64_t stamp_ns = 0;
   double exposure_s = 0.0;  ///< 0: unknown.
   ImagePyramidPtr pyramid;
-  std::shared_ptr<const VignetteCorrection> vignette;  ///< That it is freed of; null: none.
+  RadialVignette vignette;  ///< That it is freed of.
   /// Of a rolling shutter: how the camera moved while the image was read out, log(T_later_earlier)
   /// a second (translation, rotation), as its images were prepared with. What it turned is undone.
   Vec6 rate = Vec6::Zero();

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <optional>
 
+#include "sovo/vo/linearization.h"
 #include "sovo/vo/pattern.h"
 
 namespace sovo {
@@ -28,25 +29,23 @@ constexpr int kFewestInQuarter = 10;
 constexpr double kHuberSigmas = 1.345;  ///< Standard deviations.
 constexpr double kLeastSigma = 0.003;   ///< Of the logarithm of a mean of grey levels.
 
-/// Mean grey level of the pattern around a place; nothing at the image's edge.
-std::optional<double> pattern_mean(const ImageF& image, float u, float v) {
-  const int x0 = static_cast<int>(std::floor(u));
-  const int y0 = static_cast<int>(std::floor(v));
-  if (x0 < kPatternBorder || y0 < kPatternBorder || x0 + kPatternBorder >= image.width() ||
-      y0 + kPatternBorder >= image.height()) {
-    return std::nullopt;
-  }
-  const float fx = u - static_cast<float>(x0);
-  const float fy = v - static_cast<float>(y0);
+double mean(const std::array<float, kPatternSize>& grey) {
   double sum = 0.0;
-  for (const PatternOffset& o : kPattern) {
-    const float* upper = image.row(y0 + static_cast<int>(o.y)) + x0 + static_cast<int>(o.x);
-    const float* lower = upper + image.width();
-    const float above = upper[0] + fx * (upper[1] - upper[0]);
-    const float below = lower[0] + fx * (lower[1] - lower[0]);
-    sum += static_cast<double>(above + fy * (below - above));
-  }
+  for (const float g : grey) sum += static_cast<double>(g);
   return sum / kPatternSize;
+}
+
+/// Mean grey level of a pattern where an image shows it, as large as it is there.
+double pattern_mean(const ImageF& image, const PatternProjection& seen) {
+  std::array<float, kPatternSize> grey{};
+  for (std::size_t i = 0; i < kPatternSize; ++i) {
+    const float* upper = image.data() + seen.offset[i];
+    const float* lower = upper + image.width();
+    const float above = upper[0] + seen.fx[i] * (upper[1] - upper[0]);
+    const float below = lower[0] + seen.fx[i] * (lower[1] - lower[0]);
+    grey[i] = above + seen.fy[i] * (below - above);
+  }
+  return mean(grey);
 }
 
 /// What one image shows of a point.
@@ -58,9 +57,8 @@ struct View {
 };
 
 std::optional<View> view_of(const OffAxis& off_axis, const CameraModel& camera,
-                            const Keyframe& keyframe, float u, float v) {
-  const std::optional<double> grey = pattern_mean(keyframe.image(), u, v);
-  if (!grey || *grey <= 0.0) return std::nullopt;
+                            const Keyframe& keyframe, float u, float v, double grey) {
+  if (grey <= 0.0) return std::nullopt;
   View view;
   const double x = static_cast<double>(u) - camera.cx;
   const double y = static_cast<double>(v) - camera.cy;
@@ -68,7 +66,7 @@ std::optional<View> view_of(const OffAxis& off_axis, const CameraModel& camera,
   view.basis = Vec3(RadialVignette::basis(s).data());
   view.x = x / camera.width;
   view.y = y / camera.height;
-  view.log_grey = std::log(*grey);
+  view.log_grey = std::log(grey);
   view.log_known = keyframe.vignette.log_at(s);
   const double as_it_came = view.log_grey + view.log_known;
   if (as_it_came < std::log(kDark) || as_it_came > std::log(kBright)) return std::nullopt;
@@ -148,13 +146,18 @@ RadialVignette VignetteEstimate::current() const {
 
 std::vector<VignetteSight> VignetteEstimate::sights(const Window& window, int host) const {
   const auto slot = static_cast<std::size_t>(window.newest().slot);
+  const int newest = window.size() - 1;
+  PatternProjection seen;
   std::vector<VignetteSight> sights;
   sights.reserve(window[host].points.size());
   for (const Point& p : window[host].points) {
     const Residual& r = p.residuals[slot];
     if (r.state != ResidualState::kIn) continue;
-    const auto from = view_of(off_axis_, window.camera(), window[host], p.u, p.v);
-    const auto to = view_of(off_axis_, window.camera(), window.newest(), r.centre_u, r.centre_v);
+    project_pattern(window, host, newest, p, &seen);
+    if (!seen.in_view) continue;
+    const auto from = view_of(off_axis_, window.camera(), window[host], p.u, p.v, mean(p.colour));
+    const auto to = view_of(off_axis_, window.camera(), window.newest(), seen.centre_u,
+                            seen.centre_v, pattern_mean(window.newest().image(), seen));
     if (!from || !to) continue;
     sights.push_back({to->basis - from->basis, to->log_grey - from->log_grey,
                       to->log_known - from->log_known, quarter_of(*to)});

@@ -188,6 +188,13 @@ TEST(Diagnostics, WarnOfARightCameraThatIsTurned) {
   EXPECT_EQ(describe("", output, {}).level, Level::ERROR);
 }
 
+TEST(Diagnostics, SayHowMuchLightTheCornersWereFoundToHave) {
+  OdometryOutput output = test_output();
+  EXPECT_EQ(value_of(describe("", output, {}), "corner_light"), "1.000000");
+  output.corner_light = 0.75;
+  EXPECT_EQ(value_of(describe("", output, {}), "corner_light"), "0.750000");
+}
+
 TEST(Diagnostics, SayHowMuchMovesAlongWithTheCamera) {
   OdometryOutput output = test_output();
   output.co_moving_share = 0.125;

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "support/cameras.h"
+#include "vo/window_test_support.h"
 
 namespace sovo {
 namespace {
@@ -125,6 +126,60 @@ TEST(VignetteEstimate, AFewPointsSayNothing) {
   Sights sights(kTrueVignette);
   sights.points = 15;
   EXPECT_FALSE(after(&sights, 20).any());
+}
+
+/// A dark spot on a wall that faces the camera.
+struct Spot {
+  int u, v;      ///< In the image of a camera at rest [px].
+  double depth;  ///< [m].
+};
+
+/// What a camera sees of spots after it went `way` ahead [m].
+ImageF view_of_spots(const std::vector<Spot>& spots, const CameraModel& camera, double way) {
+  ImageF image(camera.width, camera.height);
+  std::fill_n(image.data(), image.size(), 150.0F);
+  for (const Spot& spot : spots) {
+    const double nearer = spot.depth / (spot.depth - way);
+    const double u = camera.cx + nearer * (spot.u - camera.cx);
+    const double v = camera.cy + nearer * (spot.v - camera.cy);
+    for (int y = 0; y < camera.height; ++y) {
+      for (int x = 0; x < camera.width; ++x) {
+        const double away = ((x - u) * (x - u) + (y - v) * (y - v)) / (nearer * nearer);
+        const double grey = 150.0 - 100.0 * std::exp(-away / 2.0);
+        image.at(x, y) = std::min(image.at(x, y), static_cast<float>(grey));
+      }
+    }
+  }
+  return image;
+}
+
+/// The spots' window: the first keyframe hosts a point in the middle of each.
+Window window_of_spots(const std::vector<Spot>& spots, double way) {
+  Window window(some_camera());
+  for (const double at : {0.0, way}) {
+    const ImageF image = view_of_spots(spots, some_camera(), at);
+    window.insert(test::make_keyframe(at == 0.0 ? 0 : 1, test::pyramid_of(image),
+                                      {SO3(), Vec3(0.0, 0.0, at)}));
+  }
+  for (const Spot& spot : spots) {
+    Point point = test::make_point(window[0].image(), spot.u, spot.v, 1.0 / spot.depth);
+    point.residuals[static_cast<std::size_t>(window[1].slot)].state = ResidualState::kIn;
+    window[0].points.push_back(point);
+  }
+  window.update_geometry();
+  return window;
+}
+
+TEST(VignetteEstimate, SpotsThatGrowDarkerAsTheyComeNearerAreNone) {
+  // Within as many pixels; and what is near goes outwards most.
+  std::vector<Spot> spots;
+  for (int v = 10; v < 190; v += 15) {
+    for (int u = 10; u < 310; u += 15) spots.push_back({u, v, (u + v) % 2 == 0 ? 3.0 : 100.0});
+  }
+  const Window window = window_of_spots(spots, 1.0);
+  VignetteEstimate estimate(some_camera());
+  for (int i = 0; i < 10; ++i) estimate.observe(window);
+  EXPECT_GT(estimate.current().log_at(1.0), -0.02);
 }
 
 TEST(SolveWithoutPositive, IsTheLeastOfAllThatAreAllowed) {

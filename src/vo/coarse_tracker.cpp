@@ -263,6 +263,17 @@ CoarseTracker::Fit CoarseTracker::fit(const TrackingReference& reference, const 
   return {out.saturated, out.energy};
 }
 
+double CoarseTracker::unexplained(const TrackingReference& reference, const ReferenceLevel& points,
+                                  const ImageF& image, double exposure_s, TrackingResult pose) {
+  Linearization out;
+  const double energy = residuals(
+      points, image, pose.T_current_reference,
+      brightness_transfer(reference.affine, reference.exposure_s, pose.affine, exposure_s),
+      norm_for(config_, reference), &out);
+  compare(points, image, &pose);
+  return std::sqrt(energy) / std::max(pose.correlation * pose.correlation, 1e-6);
+}
+
 CoarseTracker::Linearization CoarseTracker::linearize(const TrackingReference& reference, int level,
                                                       const ImageF& image, const SE3& T,
                                                       const BrightnessTransfer& transfer,

@@ -72,6 +72,12 @@ class CoarseTracker {
   Fit fit(const TrackingReference& reference, const ImageF& image, const SE3& T_current_reference,
           const BrightnessTransfer& transfer);
 
+  /// The robust residuals of a pose over some points of level 0, for the share of the variance of
+  /// their brightness that it explains [grey levels]. Those residuals alone hardly tell a wrong
+  /// place from the right one: what does not agree there counts no more than the cutoff.
+  double unexplained(const TrackingReference& reference, const ReferenceLevel& points,
+                     const ImageF& image, double exposure_s, TrackingResult pose);
+
   /// One linearization for tests: 8x8 normal matrix, gradient and mean energy at a level.
   struct Linearization {
     Mat8 H;

@@ -101,6 +101,11 @@ class DirectOdometry final : public MonocularBackend {
   /// which are then told to `map` in `views`.
   TrackingResult align_whole_or_rest(const TrackingReference& reference, const MonoFrame& frame,
                                      std::shared_ptr<const FrameViews>* views);
+  TrackingResult whole_or_rest(const TrackingReference& reference, const MonoFrame& frame,
+                               TrackingResult whole, std::shared_ptr<const FrameViews>* views);
+  /// Whether a camera of which no motion is known went straight on or back by another way.
+  TrackingResult search_ahead(const TrackingReference& reference, const MonoFrame& frame,
+                              TrackingResult found);
   TrackingReference as_seen(const TrackingReference& reference, const RowShift& rows,
                             const SE3& T_current_reference) const;
   /// Whether a pose is that of the reference: its points move by a pixel or so.

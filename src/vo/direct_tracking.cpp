@@ -31,6 +31,7 @@ constexpr int kOftenFailed = 4;          ///< Then frames are left out, the more
 constexpr int kMostFailed = 8;           ///< until it is every 16th one that is looked at.
 /// Of the mean depth, of a frame of which no motion is known.
 constexpr std::array kUnknownShares = {0.02, 0.04, 0.07, 0.11, 0.16, 0.21, 0.27, 0.33, 0.4, 0.48};
+constexpr double kAheadStep = 0.02;  ///< And of those straight on or back that are looked at again.
 
 /// Motions to try when none of the likely ones fits: a camera that was knocked turns by another
 /// angle than before, while its way goes on, or not. After a gap it may have gone any part of it.
@@ -129,6 +130,36 @@ TrackingResult DirectOdometry::track_likely(const TrackingReference& reference,
   return out;
 }
 
+/// On an open road nearly everything is far, and agrees wherever the camera is. The little that is
+/// near is lost on coarse levels: fine ones are aligned from places so close together that one
+/// leads to the right one, and what tells is how well the patterns around all points fit.
+TrackingResult DirectOdometry::search_ahead(const TrackingReference& reference,
+                                            const MonoFrame& frame, TrackingResult found) {
+  const bool rolling = !reference.rows.none() || !frame.rows.none();
+  const ReferenceLevel patterns =
+      rolling ? reference.levels[0]
+              : with_patterns(reference.levels[0], reference.pyramid->level(0));
+  const auto unexplained = [&](const TrackingResult& pose) {
+    return tracker_.unexplained(reference, patterns, frame.pyramid->level(0), frame.exposure_s,
+                                pose);
+  };
+  double least = unexplained(found);
+  const SE3 turn(found.T_current_reference.rotation(), Vec3::Zero());
+  const Affine affine = found.affine;
+  for (const SE3& start :
+       unknown_translations(turn, reference.mean_rho, kUnknownShares, kAheadStep)) {
+    const TrackingResult tried =
+        tracker_.refine(reference, *frame.pyramid, frame.exposure_s, affine, start, last_tracking_);
+    if (!tried.good || !is_near(tried.T_current_reference, reference.mean_rho)) continue;
+    const double rest = unexplained(tried);
+    if (rest < least) {
+      least = rest;
+      found = tried;
+    }
+  }
+  return found;
+}
+
 TrackingResult DirectOdometry::align(const TrackingReference& reference, const MonoFrame& frame) {
   if (!known_motion_) return track_from_any(reference, frame, hypotheses_, std::nullopt);
   TrackingResult likely = track_likely(reference, frame, *known_motion_);
@@ -219,7 +250,17 @@ MotionEvidence DirectOdometry::evidence_of(const TrackingReference& reference,
 TrackingResult DirectOdometry::align_whole_or_rest(const TrackingReference& reference,
                                                    const MonoFrame& frame,
                                                    std::shared_ptr<const FrameViews>* views) {
-  TrackingResult whole = align(reference, frame);
+  const TrackingResult found = whole_or_rest(reference, frame, align(reference, frame), views);
+  if (known_motion_ || !found.good || *views != nullptr) return found;
+  const TrackingResult better = search_ahead(reference, frame, found);
+  const bool same =
+      is_nearly(better.T_current_reference, found.T_current_reference, reference.mean_rho);
+  return same ? found : whole_or_rest(reference, frame, better, views);
+}
+
+TrackingResult DirectOdometry::whole_or_rest(const TrackingReference& reference,
+                                             const MonoFrame& frame, TrackingResult whole,
+                                             std::shared_ptr<const FrameViews>* views) {
   if (!is_doubtful(reference, frame, &whole)) {
     rest_failed_ = rest_waits_ = 0;
     motion_confirmed_ = false;

@@ -19,6 +19,17 @@ void add_rotations(const SE3& around, std::vector<SE3>* hypotheses) {
   }
 }
 
+/// Along the first `axes`, to either side.
+void add_translations(const SE3& around, double length, int axes, std::vector<SE3>* hypotheses) {
+  for (int axis = 0; axis < axes; ++axis) {
+    for (const double sign : {-1.0, 1.0}) {
+      Vec3 t = Vec3::Zero();
+      t[axis] = sign * length;
+      hypotheses->push_back(SE3(SO3(), t) * around);
+    }
+  }
+}
+
 /// Steps to either side of a grid, of which the outermost is at `reach`, or nearer when that takes
 /// more than `most`.
 int steps_to(double reach, double step, int most) {
@@ -30,16 +41,21 @@ int steps_to(double reach, double step, int most) {
 std::vector<SE3> unknown_motions(const SE3& around, double mean_rho,
                                  std::span<const double> shares) {
   std::vector<SE3> out = {around};
-  for (const double share : shares) {
-    for (int axis = 0; axis < 3; ++axis) {
-      for (const double sign : {-1.0, 1.0}) {
-        Vec3 t = Vec3::Zero();
-        t[axis] = sign * share / mean_rho;
-        out.push_back(SE3(SO3(), t) * around);
-      }
+  for (const double share : shares) add_translations(around, share / mean_rho, 3, &out);
+  add_rotations(around, &out);
+  return out;
+}
+
+std::vector<SE3> unknown_translations(const SE3& around, double mean_rho,
+                                      std::span<const double> shares, double ahead) {
+  std::vector<SE3> out = {around};
+  for (const double share : shares) add_translations(around, share / mean_rho, 2, &out);
+  const double most = *std::ranges::max_element(shares);
+  for (int i = 1; i * ahead <= most; ++i) {
+    for (const double sign : {-1.0, 1.0}) {
+      out.push_back(SE3(SO3(), Vec3(0.0, 0.0, sign * i * ahead / mean_rho)) * around);
     }
   }
-  add_rotations(around, &out);
   return out;
 }
 

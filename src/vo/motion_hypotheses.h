@@ -14,6 +14,11 @@ namespace sovo {
 std::vector<SE3> unknown_motions(const SE3& around, double mean_rho,
                                  std::span<const double> shares);
 
+/// `around` and translations alone: as above across the optical axis, along it every `ahead` of the
+/// mean depth, as far as the largest share.
+std::vector<SE3> unknown_translations(const SE3& around, double mean_rho,
+                                      std::span<const double> shares, double ahead);
+
 /// Turns by up to `reach` around each axis [rad], dense enough for alignment on `level` to begin
 /// from one of them: a pixel of it apart.
 std::vector<SO3> turns(double reach, const CameraModel& level);

@@ -96,6 +96,13 @@ class Robustness(SimTest):
         self.expect_whole(truth, live, 0.4)
         self.assertNotIn("seems to move", self.log)
 
+    def test_the_map_begins_in_the_middle_of_an_open_highway(self):
+        # Nearly three metres a frame, of which hardly anything near by tells.
+        for world, start in ((1, 40), (1, 140), (3, 40)):
+            truth, live = self.fly("highway", "--reverse", "--start", start, "--frames", 12,
+                                   "--set", f"sim.seed={world}", calibration=())
+            self.expect_whole(truth, live, 0.5)
+
     def test_the_light_changes_at_once(self):
         truth, live = self.fly("hall", "--frames", 110, light_factor=0.35, light_from_s=1.5,
                                light_until_s=3)

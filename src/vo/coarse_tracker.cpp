@@ -440,6 +440,28 @@ double CoarseTracker::score_aligned(const TrackingReference& reference, int leve
   return badness(o.rmse, o.last.inliers, reference.levels[static_cast<std::size_t>(level)].size());
 }
 
+std::vector<SE3> CoarseTracker::likeliest(const TrackingReference& reference,
+                                          const ImagePyramid& pyramid, double exposure_s,
+                                          const Affine& affine_guess, std::span<const SE3> motions,
+                                          std::size_t keep) {
+  const int level = std::min(1, num_levels(reference, pyramid) - 1);
+  const BrightnessTransfer transfer =
+      brightness_transfer(reference.affine, reference.exposure_s, affine_guess, exposure_s);
+  std::vector<Ranked> ranked;
+  for (const SE3& T : motions) {
+    Linearization at;
+    ranked.push_back(
+        {residuals(reference.levels[static_cast<std::size_t>(level)], pyramid.level(level), T,
+                   transfer, norm_for(config_, reference), &at),
+         T});
+  }
+  sort_best_first(&ranked);
+  if (ranked.size() > keep) ranked.resize(keep);
+  std::vector<SE3> out;
+  for (const Ranked& r : ranked) out.push_back(r.T);
+  return out;
+}
+
 std::vector<SE3> CoarseTracker::rank(const TrackingReference& reference,
                                      const ImagePyramid& pyramid, double exposure_s,
                                      const Affine& affine_guess, std::span<const SE3> hypotheses,

@@ -64,6 +64,12 @@ class CoarseTracker {
                         double exposure_s, const Affine& affine_guess,
                         std::span<const SE3> hypotheses, std::size_t keep);
 
+  /// Those of many motions that leave the least residuals of the second finest level, as they are;
+  /// best first. Points that leave the view do not count against one.
+  std::vector<SE3> likeliest(const TrackingReference& reference, const ImagePyramid& pyramid,
+                             double exposure_s, const Affine& affine_guess,
+                             std::span<const SE3> motions, std::size_t keep);
+
   /// How a motion fits level 0.
   struct Fit {
     double misfits = 0.0;  ///< Share of the points in view whose residual exceeds the cutoff.

@@ -31,6 +31,7 @@ constexpr int kOftenFailed = 4;          ///< Then frames are left out, the more
 constexpr int kMostFailed = 8;           ///< until it is every 16th one that is looked at.
 /// Of the mean depth, of a frame of which no motion is known.
 constexpr std::array kUnknownShares = {0.02, 0.04, 0.07, 0.11, 0.16, 0.21, 0.27, 0.33, 0.4, 0.48};
+constexpr std::size_t kStartsAhead = 44;  ///< Of all of them, those that fit best as they are.
 constexpr double kAheadStep = 0.02;  ///< And of those straight on or back that are looked at again.
 
 /// Motions to try when none of the likely ones fits: a camera that was knocked turns by another
@@ -146,8 +147,10 @@ TrackingResult DirectOdometry::search_ahead(const TrackingReference& reference,
   double least = unexplained(found);
   const SE3 turn(found.T_current_reference.rotation(), Vec3::Zero());
   const Affine affine = found.affine;
-  for (const SE3& start :
-       unknown_translations(turn, reference.mean_rho, kUnknownShares, kAheadStep)) {
+  const std::vector<SE3> starts =
+      unknown_translations(turn, reference.mean_rho, kUnknownShares, kAheadStep);
+  for (const SE3& start : tracker_.likeliest(reference, *frame.pyramid, frame.exposure_s, affine,
+                                             starts, kStartsAhead)) {
     const TrackingResult tried =
         tracker_.refine(reference, *frame.pyramid, frame.exposure_s, affine, start, last_tracking_);
     if (!tried.good || !is_near(tried.T_current_reference, reference.mean_rho)) continue;

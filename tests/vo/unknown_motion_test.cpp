@@ -96,6 +96,20 @@ TEST(UnknownMotion, WhatAPoseLeavesUnexplainedIsLeastWhereTheCameraIs) {
   }
 }
 
+TEST(UnknownMotion, TheLikeliestStartsAreThoseNearTheTruth) {
+  const SyntheticScene scene(3);
+  const TrackingReference reference = reference_of(scene);
+  const SE3 truth(SO3(), Vec3(0.0, 0.0, -0.3));
+  const ImagePyramidPtr image = scene_view(scene, small_camera(), truth.inverse());
+  std::vector<SE3> starts;
+  for (int i = -10; i <= 10; ++i) starts.push_back({SO3(), Vec3(0.0, 0.0, 0.06 * i)});
+  CoarseTracker tracker{TrackerConfig()};
+  const std::vector<SE3> likeliest = tracker.likeliest(reference, *image, 0.0, {}, starts, 3);
+  ASSERT_EQ(likeliest.size(), 3U);
+  EXPECT_NEAR(likeliest.front().translation().z(), -0.3, 1e-9);
+  for (const SE3& T : likeliest) EXPECT_NEAR(T.translation().z(), -0.3, 0.061);
+}
+
 TEST(UnknownMotion, ResidualsBeyondTheCutoffTellByCorrelation) {
   // One pixel of eight disagrees, little or entirely: the same robust residuals.
   const SyntheticScene scene(3);

@@ -101,9 +101,11 @@ class DirectOdometry final : public MonocularBackend {
   /// which are then told to `map` in `views`.
   TrackingResult align_whole_or_rest(const TrackingReference& reference, const MonoFrame& frame,
                                      std::shared_ptr<const FrameViews>* views);
+  /// `whole`, or where the image speaks against it a pose by what does not stay in its place.
   TrackingResult whole_or_rest(const TrackingReference& reference, const MonoFrame& frame,
                                TrackingResult whole, std::shared_ptr<const FrameViews>* views);
-  /// Whether a camera of which no motion is known went straight on or back by another way.
+  /// Where a camera of which no motion is known may be rather than where it was found, as far as it
+  /// is as turned: most of all straight on or back from the reference.
   TrackingResult search_ahead(const TrackingReference& reference, const MonoFrame& frame,
                               TrackingResult found);
   TrackingReference as_seen(const TrackingReference& reference, const RowShift& rows,
@@ -158,6 +160,7 @@ class DirectOdometry final : public MonocularBackend {
   MotionModel motion_before_;  ///< As the frame tracked last found it.
   /// The motion since the reference when it is as it was between the past frames.
   std::optional<KnownMotion> known_motion_;
+  bool place_unknown_ = false;   ///< Neither a motion nor recognition tells where the frame is.
   std::vector<SE3> hypotheses_;  ///< T_camera_reference of the new frame, the likeliest first.
   Affine last_affine_;
   LastTracking last_tracking_;

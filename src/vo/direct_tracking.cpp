@@ -85,6 +85,7 @@ void DirectOdometry::find_motion_hypotheses(const TrackingReference& reference,
   const MotionModel::Forecast forecast =
       motion_.forecast(reference, frame.stamp_ns, max_acceleration);
   known_motion_ = forecast.known;
+  place_unknown_ = !known_motion_;
   if (!known_motion_) {
     hypotheses_ = tracker_.rank(reference, *frame.pyramid, frame.exposure_s, last_affine_,
                                 unknown_motions(forecast.last, reference.mean_rho, kUnknownShares),
@@ -254,7 +255,7 @@ TrackingResult DirectOdometry::align_whole_or_rest(const TrackingReference& refe
                                                    const MonoFrame& frame,
                                                    std::shared_ptr<const FrameViews>* views) {
   const TrackingResult found = whole_or_rest(reference, frame, align(reference, frame), views);
-  if (known_motion_ || !found.good || *views != nullptr) return found;
+  if (!place_unknown_ || !found.good || *views != nullptr) return found;
   const TrackingResult better = search_ahead(reference, frame, found);
   const bool same =
       is_nearly(better.T_current_reference, found.T_current_reference, reference.mean_rho);
@@ -299,6 +300,7 @@ TrackedFrame DirectOdometry::track(const MonoFrame& frame, double max_accelerati
 
 TrackedFrame DirectOdometry::track_again(const MonoFrame& frame, const TrackedFrame& before) {
   motion_ = motion_before_;
+  place_unknown_ = false;
   hypotheses_ = {before.tracking.T_current_reference};
   return track_hypotheses(frame,
                           std::static_pointer_cast<const TrackingReference>(before.reference));
@@ -307,6 +309,7 @@ TrackedFrame DirectOdometry::track_again(const MonoFrame& frame, const TrackedFr
 TrackedFrame DirectOdometry::track_from(const MonoFrame& frame, const SE3& T_current_reference) {
   motion_before_ = motion_;
   known_motion_.reset();
+  place_unknown_ = false;
   hypotheses_ = {T_current_reference};
   return track_hypotheses(frame, tracking_reference());
 }

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 #include <vector>
 
 #include "vo/drive_test_support.h"
@@ -83,6 +85,43 @@ TEST_F(Map, ScatterOfGradientsGoesOnToTheReference) {
     EXPECT_EQ(vo_.tracking_reference()->gradient_scatter, result.bundle.gradient_scatter);
   }
   EXPECT_GE(keyframes, 2);
+}
+
+/// What the scene looks like through a lens that darkens the corners.
+MonoFrame darkened(MonoFrame frame) {
+  const OffAxis off_axis(small_camera());
+  const RadialVignette vignette{{-0.5, 0.0, 0.0}};
+  const ImageF s = off_axis.of(small_camera());
+  ImageF image = frame.pyramid->level(0);
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    image.data()[i] *= static_cast<float>(std::exp(vignette.log_at(s.data()[i])));
+  }
+  frame.pyramid = pyramid_of(std::move(image));
+  return frame;
+}
+
+TEST_F(Map, AVignetteIsTakenFromFramesWhoseMotionIsSure) {
+  for (const bool doubtful : {false, true}) {
+    VignetteEstimate vignette(small_camera());
+    DirectOdometry vo(small_config(), small_camera(), ImageU8(), 0, &pool_, &vignette);
+    const MonoFrame first = darkened(first_);
+    std::vector<StartPoint> points;
+    for (const SelectedPixel& pixel : vo.select_pixels(first, 700)) {
+      const auto rho =
+          static_cast<float>(1.0 / scene_.depth(small_camera(), SE3(), Vec2(pixel.x, pixel.y)));
+      points.push_back({pixel, {rho, 0.02F * rho}});
+    }
+    vo.begin(first, SE3(), points, nullptr);
+    int keyframes = 0;
+    for (int i = 1; i <= 20; ++i) {
+      TrackedFrame tracked = vo.track(darkened(frame_at(scene_, drive(i), i)), 0.0);
+      ASSERT_TRUE(tracked.tracking.good) << i;
+      tracked.tracking.motion_denied = doubtful;
+      keyframes += vo.map(tracked, {}, nullptr).is_keyframe ? 1 : 0;
+    }
+    EXPECT_GE(keyframes, 2);
+    EXPECT_EQ(vignette.current().any(), !doubtful);
+  }
 }
 
 /// With a fifteenth of the contrast thresholds are at their least, for frames and for the window.

@@ -26,13 +26,17 @@ class Map : public ::testing::Test {
  protected:
   Map() : pool_(1), vo_(small_config(), small_camera(), ImageU8(), 0, &pool_) {
     first_ = frame_at(scene_, SE3(), 0);
+    begin(first_, &vo_);
+  }
+
+  void begin(const MonoFrame& first, DirectOdometry* vo) {
     std::vector<StartPoint> points;
-    for (const SelectedPixel& pixel : vo_.select_pixels(first_, 700)) {
+    for (const SelectedPixel& pixel : vo->select_pixels(first, 700)) {
       const auto rho =
           static_cast<float>(1.0 / scene_.depth(small_camera(), SE3(), Vec2(pixel.x, pixel.y)));
       points.push_back({pixel, {rho, 0.02F * rho}});
     }
-    vo_.begin(first_, SE3(), points, nullptr);
+    vo->begin(first, SE3(), points, nullptr);
   }
 
   SyntheticScene scene_{3};
@@ -104,14 +108,7 @@ TEST_F(Map, AVignetteIsTakenFromFramesWhoseMotionIsSure) {
   for (const bool doubtful : {false, true}) {
     VignetteEstimate vignette(small_camera());
     DirectOdometry vo(small_config(), small_camera(), ImageU8(), 0, &pool_, &vignette);
-    const MonoFrame first = darkened(first_);
-    std::vector<StartPoint> points;
-    for (const SelectedPixel& pixel : vo.select_pixels(first, 700)) {
-      const auto rho =
-          static_cast<float>(1.0 / scene_.depth(small_camera(), SE3(), Vec2(pixel.x, pixel.y)));
-      points.push_back({pixel, {rho, 0.02F * rho}});
-    }
-    vo.begin(first, SE3(), points, nullptr);
+    begin(darkened(first_), &vo);
     int keyframes = 0;
     for (int i = 1; i <= 20; ++i) {
       TrackedFrame tracked = vo.track(darkened(frame_at(scene_, drive(i), i)), 0.0);

@@ -10,6 +10,7 @@
 
 #include "sovo/geometry/pose_covariance.h"
 #include "sovo/odometry/dead_reckoning.h"
+#include "sovo/odometry/frame_check.h"
 #include "sovo/odometry/frame_verdict.h"
 #include "sovo/odometry/live_threads.h"
 #include "sovo/odometry/map_segment.h"
@@ -32,6 +33,7 @@ class StereoOdometry::Impl {
         sink_(sink),
         observer_(observer),
         preparation_(config_, cameras),
+        check_(preparation_),
         places_(config_, preparation_),
         pool_(config.threads) {
     if (config.backend == Backend::kFeatures && config.mode == OdometryMode::kStereo) {
@@ -50,7 +52,8 @@ class StereoOdometry::Impl {
     const ScopedStage stage(observer_, Stage::kFrame);
     ++received_;
     OdometryOutput out = new_output(frame);
-    const std::string refusal = refuse(frame);
+    const std::string refusal =
+        check_.refuse(frame, [this, &frame] { return moves_by(frame.stamp_ns); });
     if (!refusal.empty()) {
       ++rejected_;
       fill_counters(&out);
@@ -59,8 +62,7 @@ class StereoOdometry::Impl {
       sink_->on_frame(out);
       return;
     }
-    last_stamp_ns_ = frame.stamp_ns;
-    const std::string right_problem = preparation_.check_side(frame.right, false);
+    const std::string right_problem = check_.right_problem(frame);
     SideImage right_side = frame.right;
     right_side.stamp_offset_ns = exposure_offset(frame);
     const SideImage* right = right_problem.empty() ? &right_side : nullptr;
@@ -69,6 +71,7 @@ class StereoOdometry::Impl {
     } else {
       initialize(frame, right, &out);
     }
+    check_.doubt(&out);
     fill_counters(&out);
     sink_->on_frame(out);
   }
@@ -103,12 +106,15 @@ class StereoOdometry::Impl {
     return config_.exposure_motion && real ? offset : 0;
   }
 
-  std::string refuse(const StereoFrame& frame) const {
-    if (last_stamp_ns_ && frame.stamp_ns <= *last_stamp_ns_) {
-      return frame.stamp_ns == *last_stamp_ns_ ? "the frame's stamp repeats the last one"
-                                               : "the frame's stamp is older than the last one";
-    }
-    return preparation_.check_side(frame.left, true);
+  /// Whether the image should have changed since the last frame with a pose, for all that is known.
+  bool moves_by(std::int64_t stamp_ns) const {
+    constexpr double kPixels = 0.5;
+    if (!segment_->initialized()) return false;
+    if (followed_ == 0) return true;
+    const SE3 step = reckoning_.since_last(stamp_ns);
+    const double turn = step.rotation().log().norm();
+    const double shift = step.translation().norm() * segment_->vo().reference()->mean_rho;
+    return preparation_.rig().left.fx * (turn + shift) > kPixels;
   }
 
   void end_segment() {
@@ -146,7 +152,7 @@ class StereoOdometry::Impl {
       begin_map(frame, left, out);
       return;
     }
-    out->reason = with_exposure(segment_->reason(), frame);
+    out->reason = FrameCheck::with_exposure(segment_->reason(), frame);
     if (segment_->wants_halving()) initialize_halved(frame, T_odom_left, out);
   }
 
@@ -289,12 +295,6 @@ class StereoOdometry::Impl {
     return found.tracking.good ? found : lost;
   }
 
-  /// What goes wrong, and that it is the exposure's fault, if it is.
-  static std::string with_exposure(const std::string& reason, const StereoFrame& frame) {
-    const std::string problem = FramePreparation::exposure_problem(frame.left);
-    return problem.empty() ? reason : reason + "; " + problem;
-  }
-
   std::string why_lost(const FrameTracking& tracking) const {
     if (map_broke_down()) return "the map broke down";
     if (!tracking.out_of_reach) return "this frame does not fit the map";
@@ -305,7 +305,7 @@ class StereoOdometry::Impl {
             const FrameTracking& tracking, OdometryOutput* out) {
     ++failures_;
     out->state = OdometryState::kLost;
-    out->reason = with_exposure(why_lost(tracking), frame);
+    out->reason = FrameCheck::with_exposure(why_lost(tracking), frame);
     const bool over = failures_ >= config_.lost_frames || map_broke_down();
     const SE3 T_odom_left = recognized.value_or(reckoning_.at(frame.stamp_ns));
     if ((over || is_left_behind(frame)) && begin_next_segment(frame, right, T_odom_left, over)) {
@@ -447,6 +447,7 @@ class StereoOdometry::Impl {
   OutputSink* sink_;
   StageObserver* observer_;
   FramePreparation preparation_;
+  FrameCheck check_;
   RecentPlaces places_;
   WorkerPool pool_;
 
@@ -455,7 +456,6 @@ class StereoOdometry::Impl {
   std::optional<StereoFrame> first_frame_;  ///< Of a rolling shutter, until there is a second one.
   int unsteady_ = 0;                        ///< Frames in a row that would have been keyframes.
   TrajectoryRecorder recorder_;
-  std::optional<std::int64_t> last_stamp_ns_;
   struct Published {
     std::int64_t stamp_ns = 0;
     SE3 T_odom_left;

@@ -105,6 +105,19 @@ inline StereoFrame with_left(StereoFrame frame, const std::function<int(int x, i
   return frame;
 }
 
+/// The same images as of frame `i` of the drive, by other noise.
+inline StereoFrame with_noise(StereoFrame frame, int i) {
+  frame.stamp_ns = drive_frame(i).stamp_ns;
+  for (SideImage* side : {&frame.left, &frame.right}) {
+    auto noisy = std::make_shared<std::vector<std::uint8_t>>(*side->data);
+    for (std::size_t k = static_cast<std::size_t>(i) % 5; k < noisy->size(); k += 5) {
+      (*noisy)[k] ^= 1U;
+    }
+    side->data = noisy;
+  }
+  return frame;
+}
+
 /// An image that has nothing to do with the drive, another one for each `i`.
 inline StereoFrame unrelated_frame(int i) {
   return with_left(drive_frame(i), [i](int x, int y) {

@@ -10,9 +10,6 @@ namespace sovo {
 
 namespace {
 
-constexpr double kFrozen =
-    1.0;  ///< Images that stay alike for longer are not of a late driver [s].
-
 /// Of every eighth row: noise leaves none of them as it was.
 std::uint64_t digest_of(const SideImage& side) {
   constexpr int kRows = 8;
@@ -37,7 +34,8 @@ void RepeatedImage::note(const SideImage& side, std::int64_t stamp_ns) {
   digest_ = digest;
 }
 
-std::string FrameCheck::refuse(const StereoFrame& frame, const std::function<bool()>& moves) {
+std::string FrameCheck::refuse(const StereoFrame& frame,
+                               const std::function<double()>& believed_after_s) {
   if (last_stamp_ns_ && frame.stamp_ns <= *last_stamp_ns_) {
     return frame.stamp_ns == *last_stamp_ns_ ? "the frame's stamp repeats the last one"
                                              : "the frame's stamp is older than the last one";
@@ -45,7 +43,7 @@ std::string FrameCheck::refuse(const StereoFrame& frame, const std::function<boo
   std::string problem = preparation_.check_side(frame.left, true);
   if (!problem.empty()) return problem;
   left_.note(frame.left, frame.stamp_ns);
-  if (left_.repeats() && left_.since_s() < kFrozen && moves()) {
+  if (left_.repeats() && left_.since_s() < believed_after_s()) {
     return "left image is the one before, to the bit: its camera or driver has no new one in time";
   }
   last_stamp_ns_ = frame.stamp_ns;

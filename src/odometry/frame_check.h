@@ -33,13 +33,16 @@ class RepeatedImage {
 /// Finds frames that cannot be tracked.
 class FrameCheck {
  public:
+  /// A camera whose image stays the same for as long may be frozen [s].
+  static constexpr double kFrozen = 1.0;
+
   explicit FrameCheck(const FramePreparation& preparation) : preparation_(preparation) {}
 
   /// Why the frame cannot be tracked, and what is wrong with its stamp or its left image; empty
-  /// when nothing is. `moves`: whether the camera should see something else than before. An
-  /// image that comes once more would have it stand, and leap afterwards. But a camera without
-  /// noise, a simulated one, may have come to rest: what stays for a second is believed.
-  std::string refuse(const StereoFrame& frame, const std::function<bool()>& moves);
+  /// when nothing is. An image that comes once more would have a camera stand, and leap afterwards;
+  /// but one without noise, a simulated one, may have come to rest: what stays for
+  /// `believed_after_s` is believed [s].
+  std::string refuse(const StereoFrame& frame, const std::function<double()>& believed_after_s);
 
   /// What is wrong with the right image of a frame that was not refused; empty when nothing is.
   std::string right_problem(const StereoFrame& frame);

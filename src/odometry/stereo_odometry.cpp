@@ -52,8 +52,7 @@ class StereoOdometry::Impl {
     const ScopedStage stage(observer_, Stage::kFrame);
     ++received_;
     OdometryOutput out = new_output(frame);
-    const std::string refusal =
-        check_.refuse(frame, [this, &frame] { return moves_by(frame.stamp_ns); });
+    const std::string refusal = check_.refuse(frame, [&] { return patience(frame.stamp_ns); });
     if (!refusal.empty()) {
       ++rejected_;
       fill_counters(&out);
@@ -106,15 +105,16 @@ class StereoOdometry::Impl {
     return config_.exposure_motion && real ? offset : 0;
   }
 
-  /// Whether the image should have changed since the last frame with a pose, for all that is known.
-  bool moves_by(std::int64_t stamp_ns) const {
+  /// For how long an image that stays the same is no sign of rest [s].
+  double patience(std::int64_t stamp_ns) const {
+    constexpr double kUnknown = 0.25;  // most maps begin at rest
     constexpr double kPixels = 0.5;
-    if (!segment_->initialized()) return false;
-    if (followed_ == 0) return true;
+    if (!segment_->initialized()) return 0.0;
+    if (followed_ == 0) return kUnknown;
     const SE3 step = reckoning_.since_last(stamp_ns);
-    const double turn = step.rotation().log().norm();
     const double shift = step.translation().norm() * segment_->vo().reference()->mean_rho;
-    return preparation_.rig().left.fx * (turn + shift) > kPixels;
+    const double flow = preparation_.rig().left.fx * (step.rotation().log().norm() + shift);
+    return flow > kPixels ? FrameCheck::kFrozen : 0.0;
   }
 
   void end_segment() {

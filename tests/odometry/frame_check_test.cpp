@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "odometry_test_support.h"
+#include "odometry/odometry_test_support.h"
 
 namespace sovo::test {
 namespace {

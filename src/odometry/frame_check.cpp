@@ -10,25 +10,42 @@ namespace sovo {
 
 namespace {
 
-/// Of every eighth row: noise leaves none of them as it was.
-std::uint64_t digest_of(const SideImage& side) {
+std::size_t bytes_per_pixel(const SideImage& side) {
+  return side.format == PixelFormat::kMono16 ? 2 : 1;
+}
+
+/// Every eighth row, without its padding: noise leaves none of them as it was.
+void for_sparse_rows(const SideImage& side, const std::function<void(std::string_view)>& use) {
   constexpr int kRows = 8;
-  const std::hash<std::string_view> hash;
-  const int bytes = side.width * (side.format == PixelFormat::kMono16 ? 2 : 1);
-  std::uint64_t digest = 0;
+  const std::size_t bytes = static_cast<std::size_t>(side.width) * bytes_per_pixel(side);
   for (int y = 0; y < side.height; y += kRows) {
     const std::size_t begin = static_cast<std::size_t>(side.step) * static_cast<std::size_t>(y);
-    const auto* row = reinterpret_cast<const char*>(side.data->data() + begin);
-    digest = 31 * digest + hash({row, static_cast<std::size_t>(bytes)});
+    use({reinterpret_cast<const char*>(side.data->data() + begin), bytes});
   }
+}
+
+std::uint64_t digest_of(const SideImage& side) {
+  const std::hash<std::string_view> hash;
+  std::uint64_t digest = 0;
+  for_sparse_rows(side, [&](std::string_view row) { digest = 31 * digest + hash(row); });
   return digest;
+}
+
+/// Whether all pixels of a row are alike, in each row: white, beyond what the sensor can tell.
+bool is_blank(const SideImage& side) {
+  const std::size_t pixel = bytes_per_pixel(side);
+  bool blank = true;
+  for_sparse_rows(side, [&](std::string_view row) {
+    blank = blank && row.substr(pixel) == row.substr(0, row.size() - pixel);
+  });
+  return blank;
 }
 
 }  // namespace
 
 void RepeatedImage::note(const SideImage& side, std::int64_t stamp_ns) {
   const std::uint64_t digest = digest_of(side);
-  repeats_ = digest_ == digest;
+  repeats_ = digest_ == digest && !is_blank(side);
   if (!repeats_) first_ns_ = stamp_ns;
   since_s_ = seconds_between(first_ns_, stamp_ns);
   digest_ = digest;

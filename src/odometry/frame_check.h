@@ -12,7 +12,8 @@
 namespace sovo {
 
 /// Whether a side brings its last image once more, as drivers and bridges do that have no new one
-/// in time. No two exposures are alike to the bit, for each has noise of its own.
+/// in time. No two exposures are alike to the bit, for each has noise of its own; but those that
+/// are white all over are, and repeat nothing.
 class RepeatedImage {
  public:
   /// Precondition: `FramePreparation::check_side` found nothing.

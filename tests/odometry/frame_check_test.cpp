@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -74,6 +75,49 @@ TEST(FrameCheck, ACameraThatMovedIsBelievedToStandAfterASecond) {
   EXPECT_TRUE(o.pose_valid);
   EXPECT_EQ(o.state, OdometryState::kDegraded);
   EXPECT_NE(o.reason.find("frozen"), std::string::npos) << o.reason;
+}
+
+/// Frame `i` of a camera whose sensor is at its limit, with 8 or 16 bits a pixel.
+StereoFrame white_frame(int i, PixelFormat format) {
+  StereoFrame frame = drive_frame(i);
+  for (SideImage* side : {&frame.left, &frame.right}) {
+    const bool deep = format == PixelFormat::kMono16;
+    side->format = format;
+    side->step = side->width * (deep ? 2 : 1);
+    const auto bytes =
+        static_cast<std::size_t>(side->step) * static_cast<std::size_t>(side->height);
+    auto data = std::make_shared<std::vector<std::uint8_t>>(bytes, std::uint8_t{0xFF});
+    // Twelve bits, shifted up.
+    for (std::size_t k = 0; deep && k < bytes; k += 2) (*data)[k] = 0xF0;
+    side->data = data;
+  }
+  return frame;
+}
+
+TEST(FrameCheck, WhiteImagesAreOverexposedAndRepeatNothing) {
+  for (const PixelFormat format : {PixelFormat::kMono8, PixelFormat::kMono16}) {
+    Playback run(test_config());
+    run.give_drive(0, 6);
+    for (int i = 6; i < 10; ++i) {
+      const OdometryOutput o = run.give(white_frame(i, format));
+      EXPECT_FALSE(o.pose_valid) << i;
+      EXPECT_NE(o.reason.find("is white"), std::string::npos) << o.reason;
+      EXPECT_EQ(o.reason.find("the one before"), std::string::npos) << o.reason;
+    }
+    EXPECT_EQ(run.recorder.frames.back().rejected, 0U);
+  }
+}
+
+TEST(FrameCheck, WhiteRowsDoNotMakeAnImageWhite) {
+  Playback run(test_config());
+  run.give_drive(0, 5);
+  StereoFrame frame = drive_frame(5);
+  auto data = std::make_shared<std::vector<std::uint8_t>>(*frame.left.data);
+  std::fill(data->end() - 12 * frame.left.step, data->end(), std::uint8_t{0xFF});
+  frame.left.data = data;
+  EXPECT_TRUE(run.give(frame).pose_valid);
+  frame.stamp_ns += kPeriodNs;
+  expect_refused(run.give(frame));
 }
 
 TEST(FrameCheck, ARightImageThatComesAgainMeasuresNoScale) {

@@ -15,6 +15,7 @@ constexpr int kMany = 20;                ///< That are enough to know how little
 constexpr double kFar = 1.5;             ///< From the mean, over the gate.
 constexpr double kInDoubt = 2.5;         ///< Likewise: where a scale is not taken any more.
 constexpr int kKnocked = 6;              ///< Keyframes in a row that are far from the mean.
+constexpr double kStays = 0.85;          ///< Of their distance, which the newest has at least.
 constexpr double kLeast = 0.25;          ///< Of the threshold, once it was exceeded.
 constexpr double kSurePx = 0.25;         ///< What lenses look like at most, where they always do.
 constexpr double kSureSigmas = 1.3;      ///< Nine of ten keyframes lie on this side of it.
@@ -75,8 +76,10 @@ void RightTurn::note(double px, Axis* axis) const {
   }
   axis->astray.add(px, config_.memory);
   const double moved = std::abs(axis->astray.mean - axis->turns.mean);
-  // Those that do not agree with each other either are the scatter of another place.
-  const bool knocked = axis->astray.count >= kKnocked && moved > threshold(axis->astray);
+  // Those that do not agree with each other either are the scatter of another place, and what
+  // goes back again comes of a map that is being mended.
+  const bool stays = std::abs(px - axis->turns.mean) > kStays * moved;
+  const bool knocked = axis->astray.count >= kKnocked && moved > threshold(axis->astray) && stays;
   if (knocked || axis->astray.count >= 2 * kKnocked) {
     axis->turns = std::exchange(axis->astray, {});
     axis->in_doubt = false;

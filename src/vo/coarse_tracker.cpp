@@ -385,9 +385,12 @@ void CoarseTracker::compare_with_last(const TrackingReference& reference,
 
 bool CoarseTracker::is_believed(const TrackingReference& reference, const LastTracking& last,
                                 const TrackingResult& found) const {
-  return found.good && found.rmse < config_.max_rmse &&
-         found.inlier_ratio > config_.min_inlier_ratio &&
-         found.correlation > least_correlation(config_, last, found, reference.mean_rho);
+  if (!found.good || found.rmse >= config_.max_rmse) return false;
+  if (found.inlier_ratio > config_.min_inlier_ratio) {
+    return found.correlation > least_correlation(config_, last, found, reference.mean_rho);
+  }
+  return found.inlier_ratio > config_.least_inlier_ratio &&
+         found.correlation > config_.few_inliers_correlation;
 }
 
 TrackingResult CoarseTracker::refine(const TrackingReference& reference,

@@ -18,6 +18,11 @@ struct TrackerConfig {
   double sure_correlation = 0.9;
   double max_rmse = 40.0;         ///< Lost above [grey levels].
   double min_inlier_ratio = 0.5;  ///< Lost below: reference pixels in view that agree.
+  /// Or below this, where reference and image correlate more than `few_inliers_correlation`:
+  /// sunlit leaves a metre farther on differ in brightness, but still lie where they should. Right
+  /// poses among them have 0.6 to 0.8, wrong ones up to 0.6.
+  double least_inlier_ratio = 0.35;
+  double few_inliers_correlation = 0.65;
   /// Lost below: correlation of reference and image. Right poses have 0.6 and more, on real clips
   /// as under blows and after gaps, those taken by chance mostly less; an unrelated image of little
   /// contrast may have small residuals, but no correlation.
@@ -43,6 +48,9 @@ struct TrackerConfig {
       "or, with that share, above this correlation of reference and image, whatever the RMSE");
     v("max_rmse", max_rmse, "tracking is lost above [grey levels]");
     v("min_inlier_ratio", min_inlier_ratio, "tracking is lost below");
+    v("least_inlier_ratio", least_inlier_ratio,
+      "or below this, where reference and image correlate");
+    v("few_inliers_correlation", few_inliers_correlation, "by more than this");
     v("min_correlation", min_correlation, "tracking is lost below");
     v("min_correlation_on_way", min_correlation_on_way,
       "the same for a pose to which the motion so far led");
@@ -66,6 +74,7 @@ struct KeyframeConfig {
   double rmse_min_score = 0.13;
   double blurred_sharpness = 0.7;
   double blurred_max_score = 1.3;
+  double blurred_min_inlier_ratio = 0.75;
   int max_keyframes = 7;          ///< In the window, the newest included.
   int min_keyframes = 5;          ///< Kept although few of their points remain.
   double min_points_left = 0.05;  ///< A keyframe with a smaller share of its points leaves.
@@ -85,6 +94,8 @@ struct KeyframeConfig {
       "a frame is blurred below this share of the sharpest lately; 0: never");
     v("blurred_max_score", blurred_max_score,
       "a blurred frame is no keyframe while the next one's motion will weigh less than this");
+    v("blurred_min_inlier_ratio", blurred_min_inlier_ratio,
+      "and more of its pixels than this share agree");
     v("max_keyframes", max_keyframes, "keyframes in the window, 3 to 8");
     v("min_keyframes", min_keyframes, "kept although few of their points remain");
     v("min_points_left", min_points_left, "share of points below which a keyframe leaves");

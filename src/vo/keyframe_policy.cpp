@@ -52,9 +52,10 @@ bool wants_keyframe(const KeyframeConfig& config, const CameraModel& camera,
       brightness_transfer(reference.affine, reference.exposure_s, tracked.affine, exposure_s);
   const double moved = motion_score(config, camera, motion);
   // All that is tracked against a blurred keyframe suffers, so a sharp one is waited for while the
-  // next frame will still be near. Blur takes contrast, which says nothing of the light.
+  // next frame will still be near and fit. Blur takes contrast, which says nothing of the light.
   const double next_score = moved * (1.0 + 1.0 / history.frames);
-  if (history.blurred && next_score < config.blurred_max_score) return false;
+  const bool fits = tracked.inlier_ratio > config.blurred_min_inlier_ratio;
+  if (history.blurred && fits && next_score < config.blurred_max_score) return false;
   const double score = moved + config.brightness * std::abs(std::log(transfer.gain));
   // The residual of a camera at rest is noise, and twice of it nothing that a keyframe would mend:
   // without parallax the window's scale would be left to that noise.

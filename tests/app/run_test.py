@@ -233,21 +233,29 @@ class RecordedClips(CommandTest):
     def test_kitti(self):
         self.complete("kitti/sequences/06", "--frames", 30)
 
-    def test_a_third_of_the_pairs_while_the_camera_turns(self):
+    def thinned_euroc(self, start, step, frames):
+        """Every step-th pair."""
         source = SHARED / "data/euroc/MH_01_head/mav0"
         if not source.is_dir():
             raise unittest.SkipTest(f"SKIPPED: no recording at {source} (set SOVO_SHARED)")
         for camera in ("cam0", "cam1"):
-            folder = self.folder / "third/mav0" / camera
+            folder = self.folder / f"euroc_{start}_{step}/mav0" / camera
             (folder / "data").mkdir(parents=True)
             shutil.copy(source / camera / "sensor.yaml", folder)
             head, *rows = (source / camera / "data.csv").read_text().splitlines()
-            kept = rows[:60:3]
+            kept = rows[start:frames:step]
             (folder / "data.csv").write_text("\n".join([head, *kept]) + "\n")
             for row in kept:
                 image = row.split(",")[1].strip()
                 (folder / "data" / image).symlink_to(source / camera / "data" / image)
-        self.complete(self.folder / "third")
+        return self.folder / f"euroc_{start}_{step}"
+
+    def test_a_third_of_the_pairs_while_the_camera_turns(self):
+        self.complete(self.thinned_euroc(0, 3, 60))
+
+    def test_a_frame_that_hardly_fits_waits_for_no_sharper_one(self):
+        # Five of them were lost while a keyframe was put off for blur.
+        self.complete(self.thinned_euroc(3, 4, 60))
 
     def thinned_kitti(self, sequence, start, step):
         """Every step-th pair."""
@@ -289,6 +297,10 @@ class RecordedClips(CommandTest):
     def test_a_turn_in_which_points_are_gone_before_their_scale_is_measured(self):
         # 0.7 m without static residuals.
         self.assertTrue(self.follows_few_pairs(self.thinned_kitti("00", 0, 4), 1, 0.2))
+
+    def test_leaves_in_the_sun_of_which_few_pixels_agree(self):
+        # Three frames were lost, and the way 0.34 m off.
+        self.assertTrue(self.follows_few_pairs(self.thinned_kitti("00", 2, 4), 1, 0.2, "--out-live"))
 
     def test_a_map_begins_at_six_metres_a_frame(self):
         # Hardly anything is in view for long: one seed in six loses a frame.

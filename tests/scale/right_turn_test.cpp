@@ -101,6 +101,19 @@ TEST(RightTurn, AKnockIsNoticedAfterALongCalm) {
   EXPECT_TRUE(undone_px(keyframes.turn).isZero(0.0));
 }
 
+// Depths that are wrong after a narrow turn of the vehicle look like a yaw until they are mended.
+TEST(RightTurn, WhatGoesBackAgainWasNoKnock) {
+  Keyframes keyframes;
+  keyframes.see({0, 0, 0}, 500);
+  for (const double px : {1.41, 1.51, 1.26, 1.33, 1.12, 1.06, 0.71, 0.53, 0.52, 0.3, 0.1, 0.0}) {
+    keyframes.see({0, px, 0}, 1);
+    EXPECT_FALSE(keyframes.turn.decalibrated()) << px;
+  }
+  keyframes.see({0, 0, 0}, 10);
+  keyframes.see({0, 1.2, 0}, 6, 0.06);
+  EXPECT_TRUE(keyframes.turn.decalibrated()) << "what stays was one";
+}
+
 TEST(RightTurn, IsNotInDoubtForLong) {
   Keyframes keyframes;
   keyframes.see({0, 0, 0}, 40);

@@ -16,9 +16,10 @@ class KeyframeDecision : public ::testing::Test {
 
   /// Flow of the whole image without rotation [px], residual over that of the first frame.
   bool wanted(double flow_px, double rmse_ratio, double log_gain = 0.0, double approach = 0.0,
-              bool blurred = false, double frames = 1.0) const {
+              bool blurred = false, double frames = 1.0, double inlier_ratio = 1.0) const {
     TrackingResult tracked;
     tracked.rmse = rmse_ratio;
+    tracked.inlier_ratio = inlier_ratio;
     tracked.affine.a = log_gain;
     return wants_keyframe(KeyframeConfig(), camera_, TrackingReference(), tracked,
                           {flow_px, flow_px, approach}, 0.0, {1.0, blurred, frames});
@@ -63,6 +64,9 @@ TEST_F(KeyframeDecision, ABlurredFrameWaitsForASharpOneWhileThereIsTime) {
   EXPECT_FALSE(blurred(8.0, 2.1, 5.0)) << "blur fits badly";
   ASSERT_TRUE(wanted(20.0, 1.0, -0.51));
   EXPECT_FALSE(wanted(20.0, 1.0, -0.51, 0.0, true, 5.0)) << "and takes contrast";
+  EXPECT_FALSE(wanted(8.0, 2.1, 0.0, 0.0, true, 5.0, 0.8));
+  EXPECT_TRUE(wanted(8.0, 2.1, 0.0, 0.0, true, 5.0, 0.7)) << "the next one may not fit at all";
+  EXPECT_FALSE(wanted(8.0, 1.9, 0.0, 0.0, true, 5.0, 0.7));
 }
 
 /// A window without images, whose points are a metre away.

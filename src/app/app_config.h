@@ -57,7 +57,7 @@ struct CameraSection {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v("path", path, "dataset: KITTI odometry, EuRoC, TUM-VI, or folders left/ and right/");
+    v("path", path, "dataset: KITTI odometry or raw, EuRoC, TUM-VI, or folders left/ and right/");
     v("mcap", mcap, "recording that sovo run reads: an .mcap file or a folder of them");
     v("calibration", calibration, "calibration file; empty: the one of the dataset or of the bus");
     v("rate", rate, "1.0: real time, max: as fast as can be, auto: 1.0 on the bus, else max");

@@ -31,7 +31,7 @@ void add_input(const Command& command, CalibOptions* options) {
   command.option("--right", "ROS camera_info of the right camera", &options->right_path);
   command.option("--size", "Image size WIDTHxHEIGHT, where the file has none (KITTI, OpenCV)",
                  &options->size);
-  command.flag("--colour", "KITTI: the colour cameras, P2 and P3", &options->colour);
+  command.flag("--colour", "KITTI: the colour cameras, 2 and 3", &options->colour);
 }
 
 Result<Calibration> load(const CalibOptions& options, bool validate) {

@@ -16,9 +16,9 @@ namespace fs = std::filesystem;
 namespace formats = calibration_formats;
 
 /// Files that a folder's calibration may be in, the most specific first.
-constexpr std::array kFolderFiles = {"calibration.yaml", "calib.txt",      "camchain.yaml",
-                                     "stereo.yaml",      "intrinsics.yml", "left.yaml",
-                                     "sensor.yaml"};
+constexpr std::array kFolderFiles = {"calibration.yaml", "calib.txt",   formats::kKittiRawFile,
+                                     "camchain.yaml",    "stereo.yaml", "intrinsics.yml",
+                                     "left.yaml",        "sensor.yaml"};
 
 Calibration parse_yaml_calibration(const std::string& path, const CalibrationOptions& options) {
   const YamlField root = formats::read_yaml_file(path);
@@ -47,12 +47,28 @@ Calibration parse_file(const std::string& path, const CalibrationOptions& option
     if (line.starts_with("P0:") || line.starts_with("P2:")) {
       return formats::parse_kitti(text, path, options);
     }
+    if (line.starts_with("K_00:") || line.starts_with("K_02:")) {
+      return formats::parse_kitti_raw(text, path, options);
+    }
     if (line.starts_with("[LEFT_CAM_")) return formats::parse_zed(text, path, options);
   }
   return parse_yaml_calibration(path, options);
 }
 
-Calibration parse_folder(const std::string& path, const CalibrationOptions& options) {
+/// For a drive of KITTI raw, which is given with images as they came or rectified, their size.
+CalibrationOptions options_for(const fs::path& folder, CalibrationOptions options) {
+  CameraModel camera;
+  formats::apply_size_options(options, &camera);
+  for (const char* name : {"image_00", "image_02"}) {
+    formats::size_from_images(folder / name / "data", &camera);
+  }
+  options.image_width = camera.width;
+  options.image_height = camera.height;
+  return options;
+}
+
+Calibration parse_folder(const std::string& path, const CalibrationOptions& given) {
+  const CalibrationOptions options = options_for(path, given);
   for (const char* name : kFolderFiles) {
     const fs::path file = fs::path(path) / name;
     if (fs::is_regular_file(file)) return parse_file(file, options);
@@ -60,10 +76,17 @@ Calibration parse_folder(const std::string& path, const CalibrationOptions& opti
   for (const fs::path& folder : {fs::path(path) / "mav0", fs::path(path)}) {
     if (fs::is_regular_file(folder / "cam0" / "sensor.yaml")) return formats::parse_euroc(folder);
   }
-  throw FormatError(path +
-                    ": has no calibration: calibration.yaml (sovo), calib.txt (KITTI), "
-                    "mav0/cam0/sensor.yaml (EuRoC), camchain.yaml (Kalibr), stereo.yaml (OpenCV) "
-                    "or left.yaml and right.yaml (ROS) are looked for");
+  const fs::path of_the_day =
+      (fs::absolute(path) / ".." / formats::kKittiRawFile).lexically_normal();
+  const bool drive = fs::is_directory(fs::path(path) / "image_00" / "data") ||
+                     fs::is_directory(fs::path(path) / "image_02" / "data");
+  if (drive && fs::is_regular_file(of_the_day)) return parse_file(of_the_day, options);
+  throw FormatError(
+      path +
+      ": has no calibration: calibration.yaml (sovo), calib.txt (KITTI), "
+      "calib_cam_to_cam.txt (KITTI raw, also beside the drive), mav0/cam0/sensor.yaml (EuRoC), "
+      "camchain.yaml (Kalibr), stereo.yaml (OpenCV) "
+      "or left.yaml and right.yaml (ROS) are looked for");
 }
 
 /// Masks that lie in a dataset's folder.

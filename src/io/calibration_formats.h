@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -34,9 +35,19 @@ Vec3 translation_of(const Projection& p);
 /// The image size of the options; zero when they have none.
 void apply_size_options(const CalibrationOptions& options, CameraModel* camera);
 
+/// The image size by the first image of a folder, unless it is known already.
+void size_from_images(const std::filesystem::path& folder, CameraModel* camera);
+
+/// Beside the drives of a day of KITTI raw.
+inline constexpr const char* kKittiRawFile = "calib_cam_to_cam.txt";
+
 Calibration parse_sovo(const std::string& text, const std::string& path);
 Calibration parse_kitti(const std::string& text, const std::string& path,
                         const CalibrationOptions& options);
+/// KITTI raw's calib_cam_to_cam.txt: for images as they come (drive_*_extract), or for rectified
+/// ones (drive_*_sync) where the options have their size.
+Calibration parse_kitti_raw(const std::string& text, const std::string& path,
+                            const CalibrationOptions& options);
 Calibration parse_euroc(const std::string& mav_folder);
 Calibration parse_kalibr(const YamlField& root);
 Calibration parse_opencv(const YamlField& root, const CalibrationOptions& options);

@@ -53,7 +53,8 @@ CameraModel camera_of(const Projection& p) {
   return camera;
 }
 
-/// The image size by the first image of a folder, unless it is known already.
+}  // namespace
+
 void size_from_images(const fs::path& folder, CameraModel* camera) {
   if (camera->width > 0 || !fs::is_directory(folder)) return;
   fs::path first;
@@ -65,8 +66,6 @@ void size_from_images(const fs::path& folder, CameraModel* camera) {
   camera->width = image.width;
   camera->height = image.height;
 }
-
-}  // namespace
 
 Calibration parse_kitti(const std::string& text, const std::string& path,
                         const CalibrationOptions& options) {

@@ -104,6 +104,28 @@ class DatasetFixture : public testing::Test {
     write_text(root + "/times.txt", times);
   }
 
+  /// A drive of KITTI raw with the calibration of its day beside it, images as they come; times
+  /// are 0.1 s apart, and the right camera's images arrive 8 ms later.
+  void write_kitti_raw(const std::string& day, int frames) const {
+    std::string calibration;
+    for (const std::string number : {"00", "01"}) {
+      calibration += "S_" + number + ": 64 48\nK_" + number + ": 50 0 31.5 0 50 23.5 0 0 1\nD_" +
+                     number + ": -0.1 0 0 0 0\nR_" + number + ": 1 0 0 0 1 0 0 0 1\nT_" + number +
+                     (number == "00" ? ": 0 0 0\n" : ": -0.1 0 0\n") + "S_rect_" + number +
+                     ": 60 40\nP_rect_" + number + ": 50 0 30 0 0 50 20 0 0 0 1 0\n";
+      std::string times;
+      for (int n = 0; n < frames; ++n) {
+        const std::string folder = day + "/" + day + "_drive_0001_extract/image_" + number;
+        write_image(folder + "/data/000000000" + std::to_string(n) + ".png",
+                    (number == "00" ? 0 : 100) + n);
+        times += "2011-09-26 23:59:59." + std::to_string(n) +
+                 (number == "00" ? "00000000\n" : "08000000\n");
+        write_text(folder + "/timestamps.txt", times);
+      }
+    }
+    write_text(day + "/calib_cam_to_cam.txt", calibration);
+  }
+
   /// EuRoC layout; the right camera is `skew_ns` late.
   void write_euroc(const std::string& root, int frames, std::int64_t skew_ns = 0) const {
     for (int camera = 0; camera < 2; ++camera) {

@@ -57,6 +57,54 @@ TEST_F(DatasetLayouts, KittiWithTooFewTimesIsRefused) {
   EXPECT_NE(source.error().find("times.txt"), std::string::npos) << source.error();
 }
 
+TEST_F(DatasetLayouts, KittiRawTakesTheCalibrationOfTheDay) {
+  write_kitti_raw("2011_09_26", 3);
+  const std::string drive = path("2011_09_26/2011_09_26_drive_0001_extract");
+  for (const std::string& given : {drive, drive + "/"}) {
+    const auto source = open(given);
+    ASSERT_NE(source, nullptr);
+    EXPECT_EQ(source->layout(), LayoutKind::kKittiRawGrey);
+    EXPECT_EQ(source->rig().left.distortion, Distortion::kRadtan);
+    EXPECT_NEAR(source->rig().baseline(), 0.1, 1e-12);
+    constexpr std::int64_t kFirst = 1'317'081'599'000'000'000;  // 2011-09-26 23:59:59 UTC
+    for (int n = 0; n < 3; ++n) {
+      const SourceResult r = next(source.get());
+      ASSERT_EQ(r.state, SourceState::kFrame) << r.message;
+      EXPECT_EQ(r.frame.stamp_ns, kFirst + n * 100'000'000);
+      EXPECT_EQ(r.frame.right.stamp_offset_ns, 0) << "triggered together";
+      EXPECT_EQ(level_of(r.frame.left), n);
+      EXPECT_EQ(level_of(r.frame.right), 100 + n);
+    }
+  }
+}
+
+TEST_F(DatasetLayouts, KittiRawErrorsSayWhatToDo) {
+  write_kitti_raw("2011_09_26", 3);
+  const std::string name = "2011_09_26/2011_09_26_drive_0001_extract";
+  const auto error_of = [&](const std::string& folder) {
+    DatasetOptions options;
+    options.path = path(folder);
+    const auto source = open_dataset(options);
+    return source.ok() ? std::string() : source.error();
+  };
+  EXPECT_NE(error_of("2011_09_26").find("give one of the drives in it"), std::string::npos);
+  const std::string times = name + "/image_01/timestamps.txt";
+  write_text(times, "2011-09-26 13:02:25.9\n2011-09-26 13:02:26.0\n");
+  EXPECT_NE(error_of(name).find("has 2 times, none for image"), std::string::npos);
+  for (const std::string wrong : {"2011-09-26", "2011-13-26 13:02:26.1", "2011-09-26 13:02:x"}) {
+    write_text(times, "2011-09-26 13:02:25.9\n\n" + wrong + "\n");
+    EXPECT_NE(error_of(name).find("timestamps.txt:3: wanted a time like"), std::string::npos)
+        << error_of(name);
+  }
+  write_text(times, "2011-09-26 13:02:25.9\n2011-09-26 13:02:25.9\n2011-09-26 13:02:26.0\n");
+  EXPECT_NE(error_of(name).find("0000000001.png is not after"), std::string::npos);
+  std::filesystem::remove(path(times));
+  EXPECT_NE(error_of(name).find("timestamps.txt"), std::string::npos);
+  write_kitti_raw("2011_09_26", 3);
+  std::filesystem::remove(path("2011_09_26/calib_cam_to_cam.txt"));
+  EXPECT_NE(error_of(name).find("calib_cam_to_cam.txt"), std::string::npos) << error_of(name);
+}
+
 TEST_F(DatasetLayouts, EurocByEitherFolder) {
   write_euroc("MH", 3);
   for (const char* name : {"MH", "MH/mav0"}) {

@@ -61,8 +61,18 @@ Result<void> check_sizes(const std::vector<PairRef>& pairs, const CameraModel& c
 
 Result<Calibration> calibration_for(const DatasetLayout& layout, const DatasetOptions& options) {
   CalibrationOptions calibration;
-  if (layout.kind == LayoutKind::kKittiGrey) calibration.kitti_colour = false;
-  if (layout.kind == LayoutKind::kKittiColour) calibration.kitti_colour = true;
+  switch (layout.kind) {
+    case LayoutKind::kKittiGrey:
+    case LayoutKind::kKittiRawGrey:
+      calibration.kitti_colour = false;
+      break;
+    case LayoutKind::kKittiColour:
+    case LayoutKind::kKittiRawColour:
+      calibration.kitti_colour = true;
+      break;
+    default:
+      break;
+  }
   for (const PairRef& pair : layout.list.pairs) {
     const auto image = read_grey_image(pair.left.path.string());
     if (!image) continue;

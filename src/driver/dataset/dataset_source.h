@@ -27,7 +27,8 @@ struct DatasetOptions {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v("path", path, "folder of the dataset: KITTI odometry, EuRoC, TUM-VI, or left/ and right/");
+    v("path", path,
+      "folder of the dataset: KITTI odometry or raw, EuRoC, TUM-VI, or left/ and right/");
     v("calibration", calibration, "calibration file instead of the dataset's own");
     v("reverse", reverse, "feed the last frame first, with mirrored stamps");
     v("start_frame", start_frame, "pairs to leave out at the beginning");

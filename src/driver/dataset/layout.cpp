@@ -13,6 +13,12 @@ std::string hint_for(const fs::path& path) {
       return "; give one of the folders in " + (path / name).string();
     }
   }
+  // A day of KITTI raw holds its drives.
+  for (fs::directory_iterator it(path, code), end; !code && it != end; it.increment(code)) {
+    if (fs::is_directory(it->path() / "image_00", code)) {
+      return "; give one of the drives in it, as " + it->path().string();
+    }
+  }
   return "";
 }
 
@@ -24,6 +30,10 @@ std::string to_string(LayoutKind kind) {
       return "KITTI odometry (grey)";
     case LayoutKind::kKittiColour:
       return "KITTI odometry (colour)";
+    case LayoutKind::kKittiRawGrey:
+      return "KITTI raw (grey)";
+    case LayoutKind::kKittiRawColour:
+      return "KITTI raw (colour)";
     case LayoutKind::kEuroc:
       return "EuRoC";
     case LayoutKind::kTumVi:
@@ -40,11 +50,13 @@ Result<DatasetLayout> find_layout(const fs::path& path, double frame_rate) {
     return Error{path.string() + ": no such folder; give the folder of a dataset"};
   }
   auto layout = find_kitti(path);
+  if (!layout) layout = find_kitti_raw(path);
   if (!layout) layout = find_euroc(path);
   if (!layout) layout = find_folders(path, frame_rate);
   if (!layout) {
     return Error{path.string() +
-                 ": not a dataset: neither image_0 and image_1 (KITTI), mav0/cam0 and mav0/cam1 "
+                 ": not a dataset: neither image_0 and image_1 (KITTI), image_00 and image_01 "
+                 "(KITTI raw), mav0/cam0 and mav0/cam1 "
                  "(EuRoC, TUM-VI), nor left and right are in it" +
                  hint_for(path)};
   }

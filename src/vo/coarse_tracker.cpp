@@ -146,6 +146,7 @@ double least_correlation(const TrackerConfig& config, const LastTracking& last,
                          const TrackingResult& found, double mean_rho) {
   constexpr double kTurn = 0.02;   // [rad]
   constexpr double kShift = 0.02;  // mean depths
+  if (found.inlier_ratio <= config.min_inlier_ratio) return config.few_inliers_correlation;
   if (!last.expected) return config.min_correlation;
   const SE3 off = found.T_current_reference * last.expected->inverse();
   const bool on_way =
@@ -385,12 +386,11 @@ void CoarseTracker::compare_with_last(const TrackingReference& reference,
 
 bool CoarseTracker::is_believed(const TrackingReference& reference, const LastTracking& last,
                                 const TrackingResult& found) const {
-  if (!found.good || found.rmse >= config_.max_rmse) return false;
-  if (found.inlier_ratio > config_.min_inlier_ratio) {
-    return found.correlation > least_correlation(config_, last, found, reference.mean_rho);
-  }
-  return found.inlier_ratio > config_.least_inlier_ratio &&
-         found.correlation > config_.few_inliers_correlation;
+  // Among weak texture it is a vehicle's own body, or its shadow, that correlates.
+  const double least_ratio =
+      reference.threshold_share < 1.0 ? config_.min_inlier_ratio : config_.least_inlier_ratio;
+  return found.good && found.rmse < config_.max_rmse && found.inlier_ratio > least_ratio &&
+         found.correlation > least_correlation(config_, last, found, reference.mean_rho);
 }
 
 TrackingResult CoarseTracker::refine(const TrackingReference& reference,

@@ -20,7 +20,7 @@ struct TrackerConfig {
   double min_inlier_ratio = 0.5;  ///< Lost below: reference pixels in view that agree.
   /// Or below this, where reference and image correlate more than `few_inliers_correlation`:
   /// sunlit leaves a metre farther on differ in brightness, but still lie where they should. Right
-  /// poses among them have 0.6 to 0.8, wrong ones up to 0.6.
+  /// poses among them have 0.6 to 0.8, wrong ones up to 0.6. Not among weak texture.
   double least_inlier_ratio = 0.35;
   double few_inliers_correlation = 0.65;
   /// Lost below: correlation of reference and image. Right poses have 0.6 and more, on real clips

@@ -73,6 +73,18 @@ TEST_F(FewInliers, AreNotWhereItCorrelatesLittleOrTheyAreFewer) {
   EXPECT_FALSE(track(35.0, scene_, config).good);
 }
 
+// Thresholds are lower there, and what still correlates is the vehicle's own body or its shadow.
+TEST_F(FewInliers, AreNotAmongWeakTexture) {
+  reference_.threshold_share = 0.8;
+  TrackerConfig config;
+  config.huber /= 0.8;
+  config.cutoff /= 0.8;
+  const TrackingResult seen = track(35.0, scene_, config);
+  ASSERT_LT(seen.inlier_ratio, config.min_inlier_ratio - 0.05);
+  ASSERT_GT(seen.correlation, config.few_inliers_correlation + 0.05);
+  EXPECT_FALSE(seen.good);
+}
+
 TEST_F(FewInliers, ThatCorrelateMakeNoPoseOfAnotherScene) {
   EXPECT_FALSE(track(35.0, SyntheticScene(11)).good);
 }

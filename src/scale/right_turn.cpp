@@ -15,10 +15,12 @@ constexpr int kMany = 20;                ///< That are enough to know how little
 constexpr double kFar = 1.5;             ///< From the mean, over the gate.
 constexpr double kInDoubt = 2.5;         ///< Likewise: where a scale is not taken any more.
 constexpr int kKnocked = 6;              ///< Keyframes in a row that are far from the mean.
-constexpr double kStays = 0.85;          ///< Of their distance, which the newest has at least.
-constexpr double kLeast = 0.25;          ///< Of the threshold, once it was exceeded.
-constexpr double kSurePx = 0.25;         ///< What lenses look like at most, where they always do.
-constexpr double kSureSigmas = 1.3;      ///< Nine of ten keyframes lie on this side of it.
+/// How many times a turn must exceed what parts of the images disagree about it.
+constexpr double kDisagreements = 12.0;
+constexpr double kStays = 0.85;      ///< Of their distance, which the newest has at least.
+constexpr double kLeast = 0.25;      ///< Of the threshold, once it was exceeded.
+constexpr double kSurePx = 0.25;     ///< What lenses look like at most, where they always do.
+constexpr double kSureSigmas = 1.3;  ///< Nine of ten keyframes lie on this side of it.
 
 }  // namespace
 
@@ -26,12 +28,14 @@ RightTurn::RightTurn(const RightTurnConfig& config, double focal)
     : config_(config), focal_(focal) {}
 
 void RightTurn::note(const RightTurnEstimate& found, const SO3& given) {
-  if (!found.valid || !found.turn.allFinite()) return;
+  if (!found.valid || !found.turn.allFinite() || !found.disagreement.allFinite()) return;
   const Vec3 total = focal_ * (SO3::exp(found.turn) * given).log();
   for (int i = 0; i < 3; ++i) {
     Axis& axis = axes_[static_cast<std::size_t>(i)];
     axis.in_doubt = false;
-    if (focal_ * found.sigma[i] < kUnseenPx) note(total[i], &axis);
+    if (focal_ * found.sigma[i] < kUnseenPx) {
+      note(total[i], focal_ * found.disagreement[i], &axis);
+    }
   }
   const bool before = decalibrated_;
   decalibrated_ = config_.undo && exceeds(before ? kLeast : 1.0);
@@ -65,16 +69,16 @@ bool RightTurn::in_doubt() const {
          std::any_of(axes_.begin(), axes_.end(), [](const Axis& axis) { return axis.in_doubt; });
 }
 
-void RightTurn::note(double px, Axis* axis) const {
+void RightTurn::note(double px, double disagreement_px, Axis* axis) const {
   const double away = std::abs(px - axis->turns.mean) / (config_.gate_sigmas * spread(axis->turns));
   const bool known = axis->turns.count >= kFewest && std::abs(px - axis->turns.mean) > kSurePx;
   axis->in_doubt = known && away > kInDoubt;
   if (!known || away < kFar) {
-    axis->turns.add(px, config_.memory);
+    axis->turns.add(px, disagreement_px, config_.memory);
     axis->astray = {};
     return;
   }
-  axis->astray.add(px, config_.memory);
+  axis->astray.add(px, disagreement_px, config_.memory);
   const double moved = std::abs(axis->astray.mean - axis->turns.mean);
   // Those that do not agree with each other either are the scatter of another place, and what
   // goes back again comes of a map that is being mended.
@@ -86,13 +90,14 @@ void RightTurn::note(double px, Axis* axis) const {
   }
 }
 
-void RightTurn::Turns::add(double px, int memory) {
+void RightTurn::Turns::add(double px, double disagreement_px, int memory) {
   count = std::min(count + 1, memory);
   averaged = std::min(averaged + 1, memory);
   const double share = 1.0 / averaged;
   const double innovation = px - mean;
   mean += share * innovation;
   variance = (1.0 - share) * (variance + share * innovation * innovation);
+  disagreement += share * (disagreement_px * disagreement_px - disagreement);
 }
 
 Vec3 RightTurn::mean_px() const {
@@ -111,7 +116,8 @@ double RightTurn::spread(const Turns& turns) const {
 double RightTurn::threshold(const Turns& turns) const {
   const double scatter = (1.0 + 2.0 / turns.count) * spread(turns);
   const double gate = std::max(config_.min_px, config_.gate_sigmas * scatter);
-  return turns.count < kMany ? gate : std::min(gate, kSurePx + kSureSigmas * scatter);
+  const double bound = turns.count < kMany ? gate : std::min(gate, kSurePx + kSureSigmas * scatter);
+  return std::max(bound, kDisagreements * std::sqrt(turns.disagreement));
 }
 
 }  // namespace sovo

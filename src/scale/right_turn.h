@@ -30,9 +30,9 @@ struct RightTurnConfig {
 ///
 /// Lenses that are described badly look like small turns, which differ from place to place in the
 /// image and hence from keyframe to keyframe, and so does a map whose depths are wrong, after a
-/// narrow turn of the vehicle for one. What exceeds the scatter of keyframes by far is a turn of
-/// the camera. What a few keyframes see elsewhere is left out; where many in a row do it was
-/// knocked.
+/// narrow turn of the vehicle for one. What exceeds the scatter of keyframes by far, and what parts
+/// of their images disagree about it, is a turn of the camera. What a few keyframes see elsewhere
+/// is left out; where many in a row do it was knocked.
 class RightTurn {
  public:
   /// `focal`: of the right camera [px].
@@ -57,17 +57,18 @@ class RightTurn {
   /// Of the turns that keyframes show about an axis.
   struct Turns {
     double mean = 0.0, variance = 0.0;  ///< [px, px^2]
+    double disagreement = 0.0;          ///< Mean square of that within keyframes [px^2].
     int count = 0;                      ///< `memory` at most.
     int averaged = 0;                   ///< Of them, those that the mean is made of.
 
-    void add(double px, int memory);
+    void add(double px, double disagreement_px, int memory);
   };
   struct Axis {
     Turns turns;
     Turns astray;  ///< Those since the last keyframe that was not far from the mean.
     bool in_doubt = false;
   };
-  void note(double px, Axis* axis) const;
+  void note(double px, double disagreement_px, Axis* axis) const;
   bool exceeds(double part) const;
   Vec3 certain_px() const;
   double spread(const Turns& turns) const;

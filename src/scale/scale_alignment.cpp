@@ -267,15 +267,23 @@ void ScaleAlignment::project_turned() const {
   }
 }
 
-TurnStep ScaleAlignment::turn_step() const {
+TurnEquations* ScaleAlignment::cell_at(float x, float y, TurnCells* cells) const {
+  const ImageF& image = right_.level(level_);
+  const int column = static_cast<int>(x) * kTurnColumns / image.width();
+  const int row = static_cast<int>(y) * kTurnRows / image.height();
+  const int cell =
+      std::clamp(row, 0, kTurnRows - 1) * kTurnColumns + std::clamp(column, 0, kTurnColumns - 1);
+  return &(*cells)[static_cast<std::size_t>(cell)];
+}
+
+ScaleAlignment::TurnCells ScaleAlignment::turn_equations() const {
   project_turned();
   const ScaleProjections& at = workspace_->projections;
   const std::array<ScaleProjections, 3>& turned = workspace_->turned_projections;
   const ScalePoints& points = workspace_->points;
   const ScaleSamples& samples = workspace_->samples;
   const Weighting w = weighting(config_, dispersion_, brightness_);
-  Eigen::Matrix4d H = Eigen::Matrix4d::Zero();
-  Eigen::Vector4d b = Eigen::Vector4d::Zero();
+  TurnCells cells;
   for (std::size_t i = 0; i < static_cast<std::size_t>(points.size); ++i) {
     if (samples.mask[i] == 0.0F) continue;
     const Residual e = residual_of(w, samples.value[i], points.reference[i], samples.gradient[i],
@@ -292,18 +300,38 @@ TurnStep ScaleAlignment::turn_step() const {
       J[static_cast<Eigen::Index>(k) + 1] = static_cast<double>(moved) / kTurn;
     }
     if (!(J.squaredNorm() < kLargestSlope2)) continue;  // turned out of what the lens projects
-    H.noalias() += weight * J * J.transpose();
-    b += weight * static_cast<double>(e.r) * J;
+    TurnEquations* cell = cell_at(at.x[i], at.y[i], &cells);
+    cell->H.noalias() += weight * J * J.transpose();
+    cell->b += weight * static_cast<double>(e.r) * J;
+  }
+  return cells;
+}
+
+TurnStep ScaleAlignment::turn_step() const {
+  const TurnCells cells = turn_equations();
+  TurnEquations all;
+  for (const TurnEquations& cell : cells) {
+    all.H += cell.H;
+    all.b += cell.b;
   }
   TurnStep out;
-  if (!(H(0, 0) > 0.0)) return out;
-  out.scale_by_turn = -H.block<3, 1>(1, 0) / H(0, 0);
-  const Mat3 information = H.bottomRightCorner<3, 3>() +
-                           H.block<3, 1>(1, 0) * out.scale_by_turn.transpose() +
+  if (!(all.H(0, 0) > 0.0)) return out;
+  out.scale_by_turn = -all.H.block<3, 1>(1, 0) / all.H(0, 0);
+  const Mat3 information = all.H.bottomRightCorner<3, 3>() +
+                           all.H.block<3, 1>(1, 0) * out.scale_by_turn.transpose() +
                            Mat3::Identity() / (kUnlikelyTurn * kUnlikelyTurn);
   out.covariance = information.inverse();
-  out.turn = -out.covariance * (b.tail<3>() + out.scale_by_turn * b[0]);
-  out.log_scale = -b[0] / H(0, 0) + out.scale_by_turn.dot(out.turn);
+  out.turn = -out.covariance * (all.b.tail<3>() + out.scale_by_turn * all.b[0]);
+  out.log_scale = -all.b[0] / all.H(0, 0) + out.scale_by_turn.dot(out.turn);
+  // Sandwich estimate whose clusters are the cells: what pulls within one pulls together.
+  Eigen::Vector4d step;
+  step << out.log_scale, out.turn;
+  Vec3 variance = -out.covariance.diagonal();
+  for (const TurnEquations& cell : cells) {
+    const Eigen::Vector4d pull = cell.b + cell.H * step;
+    variance += (out.covariance * (pull.tail<3>() + out.scale_by_turn * pull[0])).cwiseAbs2();
+  }
+  out.disagreement = variance.cwiseMax(0.0).cwiseSqrt();
   return out;
 }
 

@@ -42,8 +42,17 @@ struct ScaleSums {
 struct TurnStep {
   double log_scale = 0.0;
   Vec3 turn = Vec3::Zero();
-  Mat3 covariance = Mat3::Zero();     ///< Of `turn`, log-scale being unknown [rad^2].
+  Mat3 covariance = Mat3::Zero();  ///< Of `turn`, log-scale being unknown [rad^2].
+  /// By how much more parts of the image disagree about `turn` than noise explains, as standard
+  /// deviations: a lens that is described badly is no turn [rad].
+  Vec3 disagreement = Vec3::Zero();
   Vec3 scale_by_turn = Vec3::Zero();  ///< d (best log-scale) / d turn [1/rad].
+};
+
+/// The normal equations of a step, of the samples in one part of the right image.
+struct TurnEquations {
+  Eigen::Matrix4d H = Eigen::Matrix4d::Zero();
+  Eigen::Vector4d b = Eigen::Vector4d::Zero();
 };
 
 /// Everything that an alignment stores; kept between calls to save the allocation.
@@ -122,6 +131,13 @@ class ScaleAlignment {
   /// The points as they lie where the right camera is turned a little about each of its axes, at
   /// the last linearization: by differences, whatever the lens.
   void project_turned() const;
+
+  static constexpr int kTurnColumns = 4;
+  static constexpr int kTurnRows = 3;
+  using TurnCells = std::array<TurnEquations, std::size_t{kTurnColumns * kTurnRows}>;
+  /// Of each part of the right image.
+  TurnCells turn_equations() const;
+  TurnEquations* cell_at(float x, float y, TurnCells* cells) const;
 
   const ScaleOptimizerConfig& config_;
   const RightProjection& projection_;

@@ -101,6 +101,9 @@ struct RightTurnEstimate {
   Vec3 turn = Vec3::Zero();           ///< [rad]
   Vec3 sigma = Vec3::Zero();          ///< Standard deviations, of independent residuals [rad].
   Vec3 scale_by_turn = Vec3::Zero();  ///< d log-scale / d turn [1/rad].
+  /// By how much more parts of the image disagree than `sigma` explains, as of a lens that is
+  /// described badly [rad].
+  Vec3 disagreement = Vec3::Zero();
 };
 
 /// Result of one scale optimization.

@@ -17,13 +17,18 @@ class Keyframes {
  public:
   explicit Keyframes(const RightTurnConfig& config = {}) : turn(config, kFocal) {}
 
-  void see(const Vec3& px, int count, double scatter_px = 0.02, double sigma_px = 0.03) {
+  void see(const Vec3& px, int count, double scatter_px = 0.02, double sigma_px = 0.03,
+           double disagreement_px = 0.0) {
     std::normal_distribution<double> normal(0.0, scatter_px);
     for (int i = 0; i < count; ++i) {
       const Vec3 noise(normal(random_), normal(random_), normal(random_));
       const SO3 given = turn.turn();
       const SO3 total = SO3::exp((px + noise) / kFocal);
-      turn.note({true, (total * given.inverse()).log(), Vec3::Constant(sigma_px / kFocal), {}},
+      turn.note({true,
+                 (total * given.inverse()).log(),
+                 Vec3::Constant(sigma_px / kFocal),
+                 {},
+                 Vec3::Constant(disagreement_px / kFocal)},
                 given);
     }
   }
@@ -112,6 +117,17 @@ TEST(RightTurn, WhatGoesBackAgainWasNoKnock) {
   keyframes.see({0, 0, 0}, 10);
   keyframes.see({0, 1.2, 0}, 6, 0.06);
   EXPECT_TRUE(keyframes.turn.decalibrated()) << "what stays was one";
+}
+
+TEST(RightTurn, WhatPartsOfTheImageDisagreeAboutIsNone) {
+  for (const int count : {5, 40}) {
+    Keyframes lens;
+    lens.see({0, 0.8, 0}, count, 0.02, 0.03, 0.1);
+    EXPECT_FALSE(lens.turn.decalibrated()) << count;
+    Keyframes turned;
+    turned.see({0, 0.8, 0}, count, 0.02, 0.03, 0.04);
+    EXPECT_TRUE(turned.turn.decalibrated()) << count;
+  }
 }
 
 TEST(RightTurn, IsNotInDoubtForLong) {

@@ -17,7 +17,6 @@ constexpr double kMinBaseline = 1e-6;  ///< [m]
 constexpr int kCoarseLevel = 2;        ///< Where a turn of a few pixels is still seen as one.
 constexpr int kSparsePoints = 600;     ///< Of the finer grid of a cold start.
 constexpr int kTurnIterations = 5;     ///< A pyramid level.
-constexpr double kCloseTurnPx = 0.15;  ///< Beyond which its image is no plane.
 constexpr double kFarTurnPx = 0.7;     ///< Of the right camera, beyond which one step is too long.
 constexpr double kLargestTurn = 0.1;   ///< [rad]
 constexpr double kEdgeOfRange = 0.02;  ///< Of the search, in log-scale.
@@ -109,26 +108,13 @@ bool align_turned(const Task& task, int coarsest_level, double sigma, ScaleAlign
   return sums.inliers >= task.config.min_inliers * sums.count && turn.log().norm() < kLargestTurn;
 }
 
-/// As parts of the image disagree where a step led.
-Vec3 disagreement_after(const Task& task, double sigma, const TurnStep& step,
-                        ScaleAlignment* alignment) {
-  task.workspace->points.turn_right(step.turn);
-  alignment->linearize(sigma + step.log_scale);
-  return alignment->turn_step().disagreement;
-}
-
-/// By one step from the best scale, `out`, or, where that would be long, anew from log-scale
-/// `start`.
-RightTurnEstimate find_turn(const Task& task, int coarsest_level, double start,
-                            const ScaleEstimate& out, const Vec3& coarse,
-                            ScaleAlignment* alignment) {
+/// By one step from the best scale, or, where that would be long, anew from log-scale `start`.
+RightTurnEstimate find_turn(const Task& task, int coarsest_level, double start, double inlier_ratio,
+                            const Vec3& coarse, ScaleAlignment* alignment) {
   TurnStep step = alignment->turn_step();
   const double longest = std::max(step.turn.norm(), coarse.norm()) * task.projection.focal();
-  const bool far = longest > kFarTurnPx || out.inlier_ratio < task.config.min_inliers;
+  const bool far = longest > kFarTurnPx || inlier_ratio < task.config.min_inliers;
   if (far && !align_turned(task, coarsest_level, start, alignment, &step)) return {};
-  if (!far && longest > kCloseTurnPx) {
-    step.disagreement = disagreement_after(task, out.log_scale, step, alignment);
-  }
   return {true, step.turn, step.covariance.diagonal().cwiseSqrt(), step.scale_by_turn,
           step.disagreement};
 }
@@ -158,7 +144,7 @@ ScaleEstimate estimate_robust_scale(const Task& task, bool cold_start) {
   out.residual = alignment.residual();
   out.inlier_ratio = sums.inliers / sums.count;
   out.verdict = judge(config, out, cold_start);
-  out.turn = find_turn(task, level, start, out, coarse, &alignment);
+  out.turn = find_turn(task, level, start, out.inlier_ratio, coarse, &alignment);
   return out;
 }
 

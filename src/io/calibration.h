@@ -39,7 +39,8 @@ struct CalibrationOptions {
 /// Reads a calibration, its format recognised by content: sovo, KITTI calib.txt and
 /// calib_cam_to_cam.txt, EuRoC sensor.yaml pair, Kalibr camchain, OpenCV stereo FileStorage, ROS
 /// camera_info pair, a ZED's SN*.conf (with the image size of one eye in the options). `path` is
-/// the file or a folder that has it (a dataset's folder). A folder's `mask_left.png` and
+/// the file or a folder that has it (a dataset's folder; of a drive of KITTI raw, the
+/// folder above may have it). A folder's `mask_left.png` and
 /// `mask_right.png` and, in EuRoC's layout, DSO's `dso/cam{0,1}/{pcalib.txt,vignette.png}` are read
 /// too. The error says which file, line and field, and why.
 Result<Calibration> load_calibration(const std::string& path,

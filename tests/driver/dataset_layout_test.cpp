@@ -91,7 +91,8 @@ TEST_F(DatasetLayouts, KittiRawErrorsSayWhatToDo) {
   const std::string times = name + "/image_01/timestamps.txt";
   write_text(times, "2011-09-26 13:02:25.9\n2011-09-26 13:02:26.0\n");
   EXPECT_NE(error_of(name).find("has 2 times, none for image"), std::string::npos);
-  for (const std::string wrong : {"2011-09-26", "2011-13-26 13:02:26.1", "2011-09-26 13:02:x"}) {
+  for (const std::string wrong : {"2011-09-26", "2011-13-26 13:02:26.1", "2011-09-26 13:02:x",
+                                  "2011-09-26 24:02:26.1", "2011-09-26 13:60:26.1"}) {
     write_text(times, "2011-09-26 13:02:25.9\n\n" + wrong + "\n");
     EXPECT_NE(error_of(name).find("timestamps.txt:3: wanted a time like"), std::string::npos)
         << error_of(name);

@@ -12,18 +12,8 @@ namespace {
 using namespace test;
 
 /// A reference of one keyframe with the true depths of the scene.
-Window one_keyframe(const SyntheticScene& scene, const Affine& affine = {}) {
-  const CameraModel camera = small_camera();
-  Window window(camera);
-  Keyframe& k = window.insert(make_keyframe(1, scene_view(scene, camera, SE3()), SE3(), affine));
-  k.points = scene_points(scene, camera, k.image(), {SE3()}, 0, 4);
-  for (Point& p : k.points) p.hessian = 1e4;
-  window.update_geometry();
-  return window;
-}
-
 TrackingReference scene_reference(const SyntheticScene& scene, const Affine& affine = {}) {
-  const Window window = one_keyframe(scene, affine);
+  const Window window = window_of_one(scene, affine);
   return build_tracking_reference(window, active_points(window),
                                   window.newest().pyramid->num_levels(), 50.0);
 }

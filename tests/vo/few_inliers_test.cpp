@@ -17,12 +17,7 @@ using namespace test;
 class FewInliers : public ::testing::Test {
  protected:
   FewInliers() {
-    const CameraModel camera = small_camera();
-    Window window(camera);
-    Keyframe& k = window.insert(make_keyframe(1, scene_view(scene_, camera, SE3()), SE3(), {}));
-    k.points = scene_points(scene_, camera, k.image(), {SE3()}, 0, 4);
-    for (Point& p : k.points) p.hessian = 1e4;
-    window.update_geometry();
+    const Window window = window_of_one(scene_);
     reference_ = build_tracking_reference(window, active_points(window),
                                           window.newest().pyramid->num_levels(), 50.0);
   }

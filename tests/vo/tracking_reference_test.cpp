@@ -12,17 +12,6 @@ namespace {
 
 using namespace test;
 
-/// A keyframe with the true depths of the scene.
-Window window_of_one(const SyntheticScene& scene) {
-  const CameraModel camera = small_camera();
-  Window window(camera);
-  Keyframe& k = window.insert(make_keyframe(1, scene_view(scene, camera, SE3()), SE3(), {}));
-  k.points = scene_points(scene, camera, k.image(), {SE3()}, 0, 4);
-  for (Point& p : k.points) p.hessian = 1e4;
-  window.update_geometry();
-  return window;
-}
-
 /// What is far away or lies along the way says nothing of how far one went; a weak texture does,
 /// when its pixels count as they err.
 TEST(TrackingReference, PixelsOfWeakTextureWeighMoreThanThoseOfEdges) {

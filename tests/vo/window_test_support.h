@@ -161,6 +161,17 @@ inline const std::vector<SceneView>& scene_views(int n, int stride) {
   return views;
 }
 
+/// A window of one keyframe at the origin, which hosts points at the scene's true depths.
+inline Window window_of_one(const SyntheticScene& scene, const Affine& affine = {}) {
+  const CameraModel camera = small_camera();
+  Window window(camera);
+  Keyframe& k = window.insert(make_keyframe(1, scene_view(scene, camera, SE3()), SE3(), affine));
+  k.points = scene_points(scene, camera, k.image(), {SE3()}, 0, 4);
+  for (Point& p : k.points) p.hessian = 1e4;
+  window.update_geometry();
+  return window;
+}
+
 /// A window of `n` keyframes of the synthetic scene at their true poses; each but the newest hosts
 /// points at their true depths, with residuals into all others. The states of the residuals are
 /// those of the first linearization.

@@ -29,7 +29,7 @@ std::optional<std::int64_t> parse_date_and_time(std::string_view line) {
   const std::chrono::year_month_day date{std::chrono::year(static_cast<int>(numbers[0])),
                                          std::chrono::month(static_cast<unsigned>(numbers[1])),
                                          std::chrono::day(static_cast<unsigned>(numbers[2]))};
-  if (!date.ok()) return std::nullopt;
+  if (!date.ok() || numbers[3] > 23 || numbers[4] > 59) return std::nullopt;
   const std::int64_t minutes = numbers[3] * 60 + numbers[4];
   const auto days = std::chrono::sys_days(date).time_since_epoch();
   return std::chrono::nanoseconds(days).count() + minutes * 60'000'000'000 +

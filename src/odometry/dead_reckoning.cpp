@@ -50,6 +50,10 @@ Vec6 DeadReckoning::usual_rate() const {
   return out;
 }
 
+double DeadReckoning::seconds_since_last(std::int64_t stamp_ns) const {
+  return last_stamp_ns_ ? seconds_between(*last_stamp_ns_, stamp_ns) : 0.0;
+}
+
 SE3 DeadReckoning::since_last(std::int64_t stamp_ns) const {
   if (!last_stamp_ns_) return {};
   const double since = std::clamp(seconds_between(*last_stamp_ns_, stamp_ns), 0.0, kWayGoesOn);

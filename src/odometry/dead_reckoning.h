@@ -44,6 +44,9 @@ class DeadReckoning {
   /// possible.
   ReckonedPose reckon(std::int64_t stamp_ns) const;
 
+  /// Since a pose was noted last; 0 when none was.
+  double seconds_since_last(std::int64_t stamp_ns) const;
+
   /// T_last_now: what it moves by `stamp_ns` from where it was noted last.
   SE3 since_last(std::int64_t stamp_ns) const;
 

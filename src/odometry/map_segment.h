@@ -94,8 +94,14 @@ class MapSegment {
 
   /// Tracks a frame. The limit of acceleration counts once the map has metres.
   TrackedFrame track(const MonoFrame& frame);
-  /// The same from a known motion since the newest keyframe.
+  /// Tracks a frame, which may be the one that was tracked last, from a known motion since the
+  /// newest keyframe.
   TrackedFrame track_from(const MonoFrame& frame, const SE3& T_current_reference);
+  /// Forgets that, for the frame as it was tracked before.
+  void take_back(const TrackedFrame& before) {
+    vo_->take_back();
+    readout_motion_.note(before);
+  }
   /// Tracks the frame that was tracked last again, prepared with another rate.
   TrackedFrame track_again(const MonoFrame& frame, const TrackedFrame& before);
 

@@ -15,6 +15,7 @@
 #include "sovo/odometry/live_threads.h"
 #include "sovo/odometry/map_segment.h"
 #include "sovo/odometry/recent_places.h"
+#include "sovo/odometry/recognized_tracking.h"
 #include "sovo/odometry/trajectory_recorder.h"
 
 namespace sovo {
@@ -257,9 +258,11 @@ class StereoOdometry::Impl {
       tracked = begin_again(first, frame, tracked);
     }
     std::optional<SE3> recognized;
-    if (map_broke_down() || !tracked.tracking.good) {
+    bool found_again = false;
+    if (map_broke_down() || !tracked.tracking.good || is_doubtful(tracked, reckoning_)) {
       recognized = recognize(tracked.frame, right);
-      if (recognized && !map_broke_down()) tracked = track_where(*recognized, tracked);
+      found_again = recognized && !map_broke_down() &&
+                    track_where(*recognized, reckoning_, segment_.get(), &tracked);
     }
     if (map_broke_down() || !tracked.tracking.good) {
       lose(frame, right, recognized, tracked.tracking, out);
@@ -277,7 +280,7 @@ class StereoOdometry::Impl {
              carried(tracked.reference->covariance, tracked.T_world_camera.translation()), out);
     map(std::move(tracked), right);
     judge(t, right_problem, out);
-    if (recognized && out->reason.empty()) out->reason = "found by what the last keyframes saw";
+    if (found_again && out->reason.empty()) out->reason = "found by what the last keyframes saw";
   }
 
   /// T_odom_left by what the last keyframes saw.
@@ -285,14 +288,6 @@ class StereoOdometry::Impl {
     if (right == nullptr || places_.empty()) return std::nullopt;
     if (threads_) threads_->drain();
     return places_.find(left, *right, segment_->halvings(), right_turn(), reckoning_);
-  }
-
-  /// A frame that does not fit the map where motion leads may do where it is recognized.
-  TrackedFrame track_where(const SE3& T_odom_left, const TrackedFrame& lost) {
-    const SE3 T_current_reference =
-        T_odom_left.inverse() * segment_->vo().reference()->T_world_camera;
-    TrackedFrame found = segment_->track_from(lost.frame, T_current_reference);
-    return found.tracking.good ? found : lost;
   }
 
   std::string why_lost(const FrameTracking& tracking) const {

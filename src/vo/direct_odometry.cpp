@@ -118,11 +118,7 @@ void DirectOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
   marginalized_.clear();
   snapshot_.reset();
   gradient_scatter_ = 1.0;
-  motion_.clear();
-  has_first_rmse_ = false;
-  sharpest_ = 0.0;
-  last_affine_ = {};
-  last_tracking_ = {};
+  past_ = {};
   lasting_share_ = 1.0;
   next_id_ = 0;
   Keyframe& k =

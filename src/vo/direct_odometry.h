@@ -44,6 +44,7 @@ class DirectOdometry final : public MonocularBackend {
   TrackedFrame track(const MonoFrame& frame, double max_acceleration) override;
   TrackedFrame track_again(const MonoFrame& frame, const TrackedFrame& before) override;
   TrackedFrame track_from(const MonoFrame& frame, const SE3& T_current_reference) override;
+  void take_back() override { past_ = past_kept_; }
   /// Traces the immature points, and makes the frame a keyframe when it wants to be one and its
   /// reference is still the newest.
   MapResult map(const TrackedFrame& tracked, const KeyframeStereo& stereo,
@@ -64,6 +65,20 @@ class DirectOdometry final : public MonocularBackend {
   std::shared_ptr<const TrackingReference> tracking_reference() const;
 
  private:
+  /// What a frame is compared with.
+  struct TrackingPast {
+    MotionModel motion;
+    Affine affine;            ///< Of the last frame.
+    LastTracking tracking;    ///< Of the last frame.
+    double first_rmse = 0.0;  ///< Of the first frame that was tracked against this keyframe.
+    std::uint32_t first_rmse_keyframe = 0;
+    bool has_first_rmse = false;
+    double sharpest = 0.0;  ///< `TrackingResult::sharpness` of the sharpest frame lately.
+    int rest_failed = 0;    ///< How often in a row another motion of the rest was sought in vain,
+    int rest_waits = 0;     ///< and the frames until it is sought again.
+    bool motion_confirmed = false;  ///< Though much stays in its place, when it was sought last.
+  };
+
   void trace_all(const MonoFrame& frame, const SE3& T_world_camera, const Affine& affine);
   MapResult make_keyframe(const TrackedFrame& tracked, const SE3& T_world_camera,
                           const KeyframeStereo& stereo, const MapTimer& timer);
@@ -156,21 +171,13 @@ class DirectOdometry final : public MonocularBackend {
 
   // Tracking side.
   CoarseTracker tracker_;
-  MotionModel motion_;
-  MotionModel motion_before_;  ///< As the frame tracked last found it.
+  TrackingPast past_;
+  TrackingPast past_before_;  ///< As the frame tracked last found it.
+  TrackingPast past_kept_;    ///< As the last `track_from` found it.
   /// The motion since the reference when it is as it was between the past frames.
   std::optional<KnownMotion> known_motion_;
   bool place_unknown_ = false;   ///< Neither a motion nor recognition tells where the frame is.
   std::vector<SE3> hypotheses_;  ///< T_camera_reference of the new frame, the likeliest first.
-  Affine last_affine_;
-  LastTracking last_tracking_;
-  double first_rmse_ = 0.0;
-  std::uint32_t first_rmse_keyframe_ = 0;
-  bool has_first_rmse_ = false;
-  int rest_failed_ = 0;  ///< How often in a row another motion of the rest was sought in vain,
-  int rest_waits_ = 0;   ///< and the frames until it is sought again.
-  bool motion_confirmed_ = false;  ///< Though much stays in its place, when it was sought last.
-  double sharpest_ = 0.0;          ///< `TrackingResult::sharpness` of the sharpest frame lately.
 };
 
 }  // namespace sovo

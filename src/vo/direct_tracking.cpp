@@ -83,11 +83,11 @@ Mat6 covariance_of(const TrackingResult& tracking, double gradient_scatter) {
 void DirectOdometry::find_motion_hypotheses(const TrackingReference& reference,
                                             const MonoFrame& frame, double max_acceleration) {
   const MotionModel::Forecast forecast =
-      motion_.forecast(reference, frame.stamp_ns, max_acceleration);
+      past_.motion.forecast(reference, frame.stamp_ns, max_acceleration);
   known_motion_ = forecast.known;
   place_unknown_ = !known_motion_;
   if (!known_motion_) {
-    hypotheses_ = tracker_.rank(reference, *frame.pyramid, frame.exposure_s, last_affine_,
+    hypotheses_ = tracker_.rank(reference, *frame.pyramid, frame.exposure_s, past_.affine,
                                 unknown_motions(forecast.last, reference.mean_rho, kUnknownShares),
                                 kMotionsKept);
     return;
@@ -101,27 +101,28 @@ TrackingResult DirectOdometry::track_from_any(const TrackingReference& reference
                                               const MonoFrame& frame,
                                               std::span<const SE3> hypotheses,
                                               const std::optional<SE3>& expected) {
-  LastTracking last = last_tracking_;
+  LastTracking last = past_.tracking;
   last.expected = expected;
   TrackingResult out =
-      tracker_.track(reference, *frame.pyramid, frame.exposure_s, last_affine_, hypotheses, last);
+      tracker_.track(reference, *frame.pyramid, frame.exposure_s, past_.affine, hypotheses, last);
   const SE3& found = out.T_current_reference;
   if (out.good && known_motion_ && !is_reachable(*known_motion_, found)) {
     out.good = false;
     out.out_of_reach = true;
   }
-  if (!known_motion_ && !is_near(found, reference.mean_rho)) out.good = false;
+  const SE3 from_known = place_unknown_ ? found : found * hypotheses_.front().inverse();
+  if (!known_motion_ && !is_near(from_known, reference.mean_rho)) out.good = false;
   return out;
 }
 
 TrackingResult DirectOdometry::track_likely(const TrackingReference& reference,
                                             const MonoFrame& frame, const KnownMotion& known) {
   TrackingResult out = track_from_any(reference, frame, hypotheses_, known.expected);
-  LastTracking last = last_tracking_;
+  LastTracking last = past_.tracking;
   last.expected = known.expected;
   const auto refine_from = [&](const SE3& start) {
     const TrackingResult refined =
-        tracker_.refine(reference, *frame.pyramid, frame.exposure_s, last_affine_, start, last);
+        tracker_.refine(reference, *frame.pyramid, frame.exposure_s, past_.affine, start, last);
     const bool reached = refined.good && is_reachable(known, refined.T_current_reference);
     if (reached && (!out.good || is_likelier(reference, known, refined, out))) out = refined;
   };
@@ -153,7 +154,7 @@ TrackingResult DirectOdometry::search_ahead(const TrackingReference& reference,
   for (const SE3& start : tracker_.likeliest(reference, *frame.pyramid, frame.exposure_s, affine,
                                              starts, kStartsAhead)) {
     const TrackingResult tried =
-        tracker_.refine(reference, *frame.pyramid, frame.exposure_s, affine, start, last_tracking_);
+        tracker_.refine(reference, *frame.pyramid, frame.exposure_s, affine, start, past_.tracking);
     if (!tried.good || !is_near(tried.T_current_reference, reference.mean_rho)) continue;
     const double rest = unexplained(tried);
     if (rest < least) {
@@ -169,7 +170,7 @@ TrackingResult DirectOdometry::align(const TrackingReference& reference, const M
   TrackingResult likely = track_likely(reference, frame, *known_motion_);
   if (likely.good && likely.as_expected) return likely;
   const std::vector<SE3> knocked =
-      tracker_.rank(reference, *frame.pyramid, frame.exposure_s, last_affine_,
+      tracker_.rank(reference, *frame.pyramid, frame.exposure_s, past_.affine,
                     knocked_motions(*known_motion_, reference.levels.back().camera), kMotionsKept);
   // The best of so many starts that leads to where the motion led is not there by chance.
   const bool confirms = !likely.good && likely.inliers > 0;
@@ -266,13 +267,13 @@ TrackingResult DirectOdometry::whole_or_rest(const TrackingReference& reference,
                                              const MonoFrame& frame, TrackingResult whole,
                                              std::shared_ptr<const FrameViews>* views) {
   if (!is_doubtful(reference, frame, &whole)) {
-    rest_failed_ = rest_waits_ = 0;
-    motion_confirmed_ = false;
+    past_.rest_failed = past_.rest_waits = 0;
+    past_.motion_confirmed = false;
     return whole;
   }
   const bool moves = whole.motion_denied;
-  const bool denied = whole.rest_denied || (moves && !motion_confirmed_);
-  if (--rest_waits_ > 0 && !denied) {
+  const bool denied = whole.rest_denied || (moves && !past_.motion_confirmed);
+  if (--past_.rest_waits > 0 && !denied) {
     whole.motion_denied = false;
     return whole;
   }
@@ -281,25 +282,25 @@ TrackingResult DirectOdometry::whole_or_rest(const TrackingReference& reference,
     *views = std::move(view);
     return *moved;
   }
-  motion_confirmed_ = moves && !whole.motion_denied;
+  past_.motion_confirmed = moves && !whole.motion_denied;
   if (whole.motion_denied && whole.inlier_ratio < kFitsBadly &&
       evidence_of(reference, frame, whole).is_missing()) {
     whole.good = false;
   }
-  rest_failed_ = std::min(rest_failed_ + 1, kMostFailed);
-  rest_waits_ = rest_failed_ < kOftenFailed ? 0 : 1 << (rest_failed_ - kOftenFailed);
+  past_.rest_failed = std::min(past_.rest_failed + 1, kMostFailed);
+  past_.rest_waits = past_.rest_failed < kOftenFailed ? 0 : 1 << (past_.rest_failed - kOftenFailed);
   return whole;
 }
 
 TrackedFrame DirectOdometry::track(const MonoFrame& frame, double max_acceleration) {
   auto ref = tracking_reference();
-  motion_before_ = motion_;
+  past_before_ = past_;
   find_motion_hypotheses(*ref, frame, max_acceleration);
   return track_hypotheses(frame, std::move(ref));
 }
 
 TrackedFrame DirectOdometry::track_again(const MonoFrame& frame, const TrackedFrame& before) {
-  motion_ = motion_before_;
+  past_ = past_before_;
   place_unknown_ = false;
   hypotheses_ = {before.tracking.T_current_reference};
   return track_hypotheses(frame,
@@ -307,7 +308,9 @@ TrackedFrame DirectOdometry::track_again(const MonoFrame& frame, const TrackedFr
 }
 
 TrackedFrame DirectOdometry::track_from(const MonoFrame& frame, const SE3& T_current_reference) {
-  motion_before_ = motion_;
+  past_kept_ = past_;
+  if (past_.motion.last_stamp_ns() == frame.stamp_ns) past_ = past_before_;
+  past_before_ = past_;
   known_motion_.reset();
   place_unknown_ = false;
   hypotheses_ = {T_current_reference};
@@ -318,15 +321,15 @@ TrackedHistory DirectOdometry::compare_with_past(const TrackingReference& refere
                                                  const MonoFrame& frame,
                                                  const TrackingResult& tracked) {
   constexpr double kForget = 0.9;  // a frame: a scene of weaker texture is soon the measure
-  if (!has_first_rmse_ || first_rmse_keyframe_ != reference.keyframe_id) {
-    first_rmse_ = tracked.rmse;
-    first_rmse_keyframe_ = reference.keyframe_id;
-    has_first_rmse_ = true;
+  if (!past_.has_first_rmse || past_.first_rmse_keyframe != reference.keyframe_id) {
+    past_.first_rmse = tracked.rmse;
+    past_.first_rmse_keyframe = reference.keyframe_id;
+    past_.has_first_rmse = true;
   }
-  sharpest_ = std::max(kForget * sharpest_, tracked.sharpness);
-  TrackedHistory out{.first_rmse = first_rmse_};
-  out.blurred = tracked.sharpness < config_.keyframe.blurred_sharpness * sharpest_;
-  if (const auto last_stamp_ns = motion_.last_stamp_ns()) {
+  past_.sharpest = std::max(kForget * past_.sharpest, tracked.sharpness);
+  TrackedHistory out{.first_rmse = past_.first_rmse};
+  out.blurred = tracked.sharpness < config_.keyframe.blurred_sharpness * past_.sharpest;
+  if (const auto last_stamp_ns = past_.motion.last_stamp_ns()) {
     const double since_last = seconds_between(*last_stamp_ns, frame.stamp_ns);
     out.frames = std::max(1.0, seconds_between(reference.stamp_ns, frame.stamp_ns) / since_last);
   }
@@ -359,8 +362,8 @@ TrackedFrame DirectOdometry::track_hypotheses(const MonoFrame& frame,
   if (!tracking.good) return out;
 
   const TrackedHistory history = compare_with_past(ref, frame, tracking);
-  last_tracking_ = {tracking.rmse, tracking.inlier_ratio};
-  last_affine_ = tracking.affine;
+  past_.tracking = {tracking.rmse, tracking.inlier_ratio};
+  past_.affine = tracking.affine;
   out.affine = tracking.affine;
   out.T_world_camera = ref.T_world_camera * tracking.T_current_reference.inverse();
   out.covariance = covariance_of(tracking, ref.gradient_scatter);
@@ -369,7 +372,7 @@ TrackedFrame DirectOdometry::track_hypotheses(const MonoFrame& frame,
                        config_.keyframe.max_translation_flow * pixels_for_one_of_vga(camera_));
   out.wants_keyframe =
       wants_keyframe(config_.keyframe, camera_, ref, tracking, motion, frame.exposure_s, history);
-  motion_.note(ref, tracking.T_current_reference, frame.stamp_ns);
+  past_.motion.note(ref, tracking.T_current_reference, frame.stamp_ns);
   return out;
 }
 

@@ -174,8 +174,12 @@ class MonocularBackend {
   /// it before is replaced.
   virtual TrackedFrame track_again(const MonoFrame& frame, const TrackedFrame& before) = 0;
 
-  /// The same from a known motion since the newest keyframe.
+  /// Tracks a frame, which may be the one that was tracked last, from a known motion since the
+  /// newest keyframe.
   virtual TrackedFrame track_from(const MonoFrame& frame, const SE3& T_current_reference) = 0;
+
+  /// Forgets what the last `track_from` found: what is kept is the frame as it was tracked before.
+  virtual void take_back() = 0;
 
   /// Takes a tracked frame into the map, as keyframe when it wants to be one.
   virtual MapResult map(const TrackedFrame& tracked, const KeyframeStereo& stereo,

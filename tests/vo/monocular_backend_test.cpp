@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "sovo/geometry/pose_covariance.h"
 #include "sovo/vo/direct_odometry.h"
@@ -94,15 +95,37 @@ TEST_P(Backend, APoseOutOfReachIsNone) {
   EXPECT_TRUE(vo_->track(leap, 140.0).tracking.good);
 }
 
-TEST_P(Backend, NothingIsFoundAMeanDepthAwayWhereNoMotionIsKnown) {
-  for (const double way : {0.9, 1.1}) {
+TEST_P(Backend, WhereMotionIsKnownItMayBeMoreThanAMeanDepth) {
+  const double depth = 1.0 / vo_->reference()->mean_rho;
+  const SE3 back(SO3(), Vec3(0.0, 0.0, -1.1 * depth));
+  const MonoFrame frame = frame_at(scene_, back, 1);
+  EXPECT_FALSE(vo_->track(frame, 0.0).tracking.good) << "nothing is known yet";
+  const TrackedFrame there = vo_->track_from(frame, back.inverse());
+  EXPECT_TRUE(there.tracking.good);
+  const SE3 off = there.tracking.T_current_reference * back;
+  EXPECT_LT(off.translation().norm(), 0.03 * depth);
+}
+
+TEST_P(Backend, WhatWasTriedOnceMoreIsTakenBack) {
+  // The frame after it is found as if nothing had been tried, to the bit.
+  std::vector<SE3> found;
+  for (const bool tries : {false, true}) {
+    vo_ = new_backend(GetParam(), &pool_);
     begin(first_, vo_.get());
-    const SE3 back(SO3(), Vec3(0.0, 0.0, -way / vo_->reference()->mean_rho));
-    const TrackedFrame there = vo_->track_from(frame_at(scene_, back, 1), back.inverse());
-    EXPECT_EQ(there.tracking.good, way < 1.0);
-    const SE3 off = there.tracking.T_current_reference * back;
-    EXPECT_LT(off.translation().norm() * vo_->reference()->mean_rho, 0.03) << "it would be right";
+    vo_->track(frame_at(scene_, drive(1), 1), 0.0);
+    const MonoFrame second = frame_at(scene_, drive(2), 2);
+    const TrackedFrame before = vo_->track(second, 0.0);
+    ASSERT_TRUE(before.tracking.good);
+    if (tries) {
+      const SE3 beside(SO3::exp(Vec3(0.0, 0.003, 0.0)), Vec3(0.005, 0.0, 0.0));
+      ASSERT_TRUE(
+          vo_->track_from(second, beside * before.tracking.T_current_reference).tracking.good);
+      vo_->take_back();
+    }
+    found.push_back(vo_->track(frame_at(scene_, drive(3), 3), 0.0).T_world_camera);
   }
+  EXPECT_EQ(found[0].translation(), found[1].translation());
+  EXPECT_EQ(found[0].rotation().matrix(), found[1].rotation().matrix());
 }
 
 TEST_P(Backend, AFirstMotionOfManyPixelsIsFound) {

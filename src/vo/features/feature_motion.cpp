@@ -27,6 +27,8 @@ TrackedFrame FeatureOdometry::track_again(const MonoFrame& frame, const TrackedF
 }
 
 TrackedFrame FeatureOdometry::track_from(const MonoFrame& frame, const SE3& T_current_reference) {
+  motion_kept_ = motion_;
+  if (motion_.last_stamp_ns() == frame.stamp_ns) motion_ = motion_before_;
   motion_before_ = motion_;
   return track_against(frame, tracking_reference(), {T_current_reference, std::nullopt});
 }
@@ -95,7 +97,8 @@ TrackedFrame FeatureOdometry::track_against(const MonoFrame& frame,
     out.tracking.out_of_reach = true;
   }
   const FeatureReference& ref = *reference;
-  if (!forecast.known && !is_near(out.tracking.T_current_reference, ref.mean_rho)) {
+  const SE3 from_last = out.tracking.T_current_reference * forecast.last.inverse();
+  if (!forecast.known && !is_near(from_last, ref.mean_rho)) {
     out.tracking.good = false;
   }
   out.reference = std::move(reference);

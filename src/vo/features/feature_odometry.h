@@ -33,6 +33,7 @@ class FeatureOdometry final : public MonocularBackend {
   TrackedFrame track(const MonoFrame& frame, double max_acceleration) override;
   TrackedFrame track_again(const MonoFrame& frame, const TrackedFrame& before) override;
   TrackedFrame track_from(const MonoFrame& frame, const SE3& T_current_reference) override;
+  void take_back() override { motion_ = motion_kept_; }
   MapResult map(const TrackedFrame& tracked, const KeyframeStereo& stereo,
                 const MapTimer& timer) override;
   const std::optional<KeyframeSnapshot>& snapshot() const override { return snapshot_; }
@@ -92,6 +93,7 @@ class FeatureOdometry final : public MonocularBackend {
   FeatureTracker tracker_;
   MotionModel motion_;
   MotionModel motion_before_;  ///< As the frame tracked last found it.
+  MotionModel motion_kept_;    ///< As the last `track_from` found it.
   ImagePyramidPtr last_pyramid_;
 };
 

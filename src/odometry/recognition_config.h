@@ -12,9 +12,10 @@ struct RecognitionConfig {
   double min_support = 0.15;
   /// The same where nothing is known of that motion, and landmarks that agree.
   double lost_support = 0.25;
-  int lost_inliers = 25;
-  KeypointConfig keypoints;
-  PlaceMatcherConfig matching{.min_inliers = 15, .min_shift_px = 2.0};
+  int lost_inliers = 35;
+  /// More than loops take: seen from elsewhere few are found again.
+  KeypointConfig keypoints{.per_image = 1000};
+  PlaceMatcherConfig matching{.min_inliers = 19, .min_shift_px = 2.0};
 
   template <class Visitor>
   void visit(Visitor& v) {

@@ -110,8 +110,10 @@ TrackingResult DirectOdometry::track_from_any(const TrackingReference& reference
     out.good = false;
     out.out_of_reach = true;
   }
-  const SE3 from_known = place_unknown_ ? found : found * hypotheses_.front().inverse();
-  if (!known_motion_ && !is_near(from_known, reference.mean_rho)) out.good = false;
+  // The first hypothesis is where the camera is expected or recognized, if anything tells that.
+  const bool near_expected =
+      !place_unknown_ && is_near(found * hypotheses_.front().inverse(), reference.mean_rho);
+  if (!near_expected && !is_near(found, reference.mean_rho)) out.good = false;
   return out;
 }
 

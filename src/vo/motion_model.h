@@ -31,8 +31,8 @@ struct KnownMotion {
 /// Whether a camera that was on its way can be where it was found.
 bool is_reachable(const KnownMotion& known, const SE3& T_current_reference);
 
-/// Whether a camera of whose motion nothing is known can have moved so: from a mean depth away
-/// hardly any point looks the same.
+/// Whether a camera can have moved so from the reference, or from where it is expected: from a mean
+/// depth away hardly any point looks the same.
 bool is_near(const SE3& motion, double mean_rho);
 
 /// How far a camera was found from where it was expected, in `KnownMotion::sigma`; 0: unknown.

@@ -106,6 +106,21 @@ TEST_P(Backend, WhereMotionIsKnownItMayBeMoreThanAMeanDepth) {
   EXPECT_LT(off.translation().norm(), 0.03 * depth);
 }
 
+TEST_P(Backend, NothingIsBelievedAMeanDepthFromTheReferenceAndFromWhereItIsExpected) {
+  const auto at = [&](double depths) {
+    return SE3(SO3(), Vec3(0.0, 0.0, -depths / vo_->reference()->mean_rho));
+  };
+  for (const double way : {0.97, 1.03}) {
+    vo_ = new_backend(GetParam(), &pool_);
+    begin(first_, vo_.get());
+    ASSERT_TRUE(vo_->track_from(frame_at(scene_, at(0.6), 1), at(-0.6)).tracking.good);
+    ASSERT_TRUE(vo_->track_from(frame_at(scene_, at(0.95), 2), at(-0.95)).tracking.good);
+    // Ten frames are missing, in which it should have gone four depths on.
+    const TrackedFrame stopped = vo_->track(frame_at(scene_, at(way), 13), 0.0);
+    EXPECT_EQ(stopped.tracking.good, way < 1.0) << way;
+  }
+}
+
 TEST_P(Backend, WhatWasTriedOnceMoreIsTakenBack) {
   // The frame after it is found as if nothing had been tried, to the bit.
   std::vector<SE3> found;

@@ -97,8 +97,9 @@ TrackedFrame FeatureOdometry::track_against(const MonoFrame& frame,
     out.tracking.out_of_reach = true;
   }
   const FeatureReference& ref = *reference;
-  const SE3 from_last = out.tracking.T_current_reference * forecast.last.inverse();
-  if (!forecast.known && !is_near(from_last, ref.mean_rho)) {
+  const SE3& found = out.tracking.T_current_reference;
+  const SE3& expected = forecast.known ? forecast.known->expected : forecast.last;
+  if (!is_near(found, ref.mean_rho) && !is_near(found * expected.inverse(), ref.mean_rho)) {
     out.tracking.good = false;
   }
   out.reference = std::move(reference);

@@ -4,10 +4,6 @@
 
 namespace sovo {
 
-namespace {
-
-/// Whether `found` is to be believed rather than `before`: what many landmarks and the motion say
-/// counts more than how well pixels fit.
 bool is_better(const TrackedFrame& found, const TrackedFrame& before,
                const ReckonedPose& expected) {
   constexpr double kClearly = 0.9;
@@ -16,8 +12,6 @@ bool is_better(const TrackedFrame& found, const TrackedFrame& before,
       expected.is_likely(found.T_world_camera) && !expected.is_likely(before.T_world_camera);
   return likelier || found.tracking.rmse < kClearly * before.tracking.rmse;
 }
-
-}  // namespace
 
 bool is_doubtful(const TrackedFrame& tracked, const DeadReckoning& reckoning) {
   constexpr double kWhile = 0.25;  // [s]

@@ -11,6 +11,10 @@ namespace sovo {
 /// while in which the camera may have gone farther than tracking finds.
 bool is_doubtful(const TrackedFrame& tracked, const DeadReckoning& reckoning);
 
+/// Whether `found`, where a frame was recognized, is to be believed rather than `before`: what many
+/// landmarks and the motion say counts more than how well pixels fit.
+bool is_better(const TrackedFrame& found, const TrackedFrame& before, const ReckonedPose& expected);
+
 /// Tracks the frame `tracked` once more from where it is recognized. If it fits the map there, and
 /// better than where it was found, it is replaced, and true returned.
 bool track_where(const SE3& T_odom_left, const DeadReckoning& reckoning, MapSegment* segment,

@@ -2,8 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace sovo {
+
+std::int64_t exposure_offset_ns(const StereoFrame& frame) {
+  constexpr double kSigmas = 3.0;
+  const std::int64_t offset = frame.right.stamp_offset_ns - frame.left.stamp_offset_ns;
+  const double error = kSigmas * std::numbers::sqrt2 * frame.stamp_sigma_s;
+  return std::abs(1e-9 * static_cast<double>(offset)) > error ? offset : 0;
+}
 
 void ExposureMotion::note(const ReferenceKeyframe& reference, const SE3& T_camera_reference,
                           std::int64_t stamp_ns) {

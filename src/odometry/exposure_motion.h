@@ -4,9 +4,14 @@
 #include <optional>
 
 #include "sovo/geometry/se3.h"
+#include "sovo/image/stereo_frame.h"
 #include "sovo/vo/motion_model.h"
 
 namespace sovo {
+
+/// From the exposure of the left image to that of the right one [ns]; what stamps of cameras that
+/// are triggered together err by is none.
+std::int64_t exposure_offset_ns(const StereoFrame& frame);
 
 /// How the left camera moves about the instant of a frame: as in the frames before, with the
 /// acceleration that they show. It tells where the camera goes until the right one exposes, where

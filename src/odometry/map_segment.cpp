@@ -60,11 +60,6 @@ void set_points(const KeyframePoints& points, const ImageF& image, int halvings,
   }
 }
 
-DepthProposal proposal_of(const StaticMatch& match) {
-  if (match.state != MatchState::kMatched) return {};
-  return {match.inverse_depth, match.sigma};
-}
-
 }  // namespace
 
 MapSegment::MapSegment(const StereoOdometryConfig& config, const FramePreparation& preparation,
@@ -89,7 +84,7 @@ bool MapSegment::initialize(const MonoFrame& frame, const SideImage* right,
   const bool only_stereo = config_.init == InitMethod::kStereo;
   const bool due = only_stereo || attempts_ % kStereoEvery == 0;
   ++attempts_;
-  stereo_problem_.clear();
+  stereo_quality_.reset();
   if (config_.init != InitMethod::kTwoView && right != nullptr && due) {
     if (initialize_from_stereo(frame, *right, T_odom_left)) {
       two_view_initializer_.reset();
@@ -108,60 +103,50 @@ ImagePyramidPtr MapSegment::prepare_right(const SideImage& right, const MonoFram
   return pyramid;
 }
 
-bool MapSegment::wants_halving() const {
-  return !stereo_problem_.empty() && attempts_ > kStereoEvery;
+Halving MapSegment::halving(bool noise_broke) const {
+  if (!stereo_quality_) return {};
+  if (!initialized_ && attempts_ > kStereoEvery) return {preparation_.max_halvings(), false};
+  const bool doubtful = is_noisy() && (!initialized_ || noise_broke);
+  if (config_.init != InitMethod::kAuto || !doubtful) return {};
+  return {std::min(1, preparation_.max_halvings()), true};
+}
+
+bool MapSegment::is_noisy() const {
+  return halvings_ == 0 && stereo_quality_ && stereo_quality_->is_noisy();
 }
 
 bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage& right,
                                         const SE3& T_odom_left) {
   const std::vector<SelectedPixel> pixels = vo_->select_pixels(frame, vo_->wanted_points());
   const ImagePyramidPtr right_pyramid = prepare_right(right, frame);
-  const std::vector<StaticMatch> matches =
-      match_all(right_.matcher(), *frame.pyramid, *right_pyramid, pixels);
-  std::vector<StartPoint> points(pixels.size());
-  std::size_t good = 0;
-  std::size_t in_view = 0;
-  double scale_information = 0.0;
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    points[i] = {pixels[i], proposal_of(matches[i])};
-    in_view += matches[i].state != MatchState::kOutOfView ? 1 : 0;
-    if (points[i].depth.sigma <= 0.0F) continue;
-    ++good;
-    scale_information += std::pow(points[i].depth.rho / points[i].depth.sigma, 2);
-  }
-  // Depths of weak texture are rougher: it takes more of them.
-  const bool weak = !pixels.empty() && pixels.front().threshold_share < 1.0F;
-  const std::size_t fewest = weak ? 200 : 100;
-  const double share = in_view > 0 ? static_cast<double>(good) / static_cast<double>(in_view) : 0.0;
-  if (good < fewest || (config_.init == InitMethod::kAuto && share < config_.init_min_matched)) {
-    stereo_problem_ =
-        "only " + std::to_string(good) + " of " + std::to_string(in_view) +
-        " static stereo matches are good: too little texture, repetitive texture, or a "
-        "wrong calibration (sovo calib check)";
-    reason_ = stereo_problem_;
+  const StereoStart start =
+      stereo_start(pixels, match_all(right_.matcher(), *frame.pyramid, *right_pyramid, pixels));
+  stereo_quality_ = start.quality;
+  const bool any_share = config_.init == InitMethod::kStereo;
+  if (!start.quality.is_enough(any_share ? 0.0 : config_.init_min_matched)) {
+    reason_ = start.quality.problem();
     return false;
   }
   if (stereo()) vo_->use_static_residuals(right_.rig());
   const bool at_once = right.stamp_offset_ns == 0;
   T_odom_left_start_ = T_odom_left;
   scale_path_.restart(T_odom_left.translation());
-  vo_->begin(frame, T_odom_left_start_, points, stereo() && at_once ? right_pyramid : nullptr);
+  vo_->begin(frame, T_odom_left_start_, start.points,
+             stereo() && at_once ? right_pyramid : nullptr);
   readout_motion_.begin(*vo_->reference());
   exposure_motion_.note(*vo_->reference(), SE3(), frame.stamp_ns);
   // Matching errors are independent; what remains is common to all: the calibration, and where the
   // right camera went until its own exposure, as no motion is known yet.
-  const double matching = 1.0 / std::sqrt(scale_information);
   const double moved = kUnknownSpeed * 1e-9 * static_cast<double>(right.stamp_offset_ns);
-  filter_.lock_initial(std::hypot(matching, moved / rig().baseline()), frame.stamp_ns);
+  filter_.lock_initial(std::hypot(start.scale_sigma, moved / rig().baseline()), frame.stamp_ns);
   publish_scale(nullptr, true);
   initialized_ = true;
-  stereo_problem_.clear();
   reason_.clear();
-  MappingOutcome start;
-  start.map.active_points = vo_->num_active_points();
-  start.map.keyframes = 1;
-  start.keyframes = {first_keyframe(frame, right_pyramid)};
-  start_outcome_ = std::move(start);
+  MappingOutcome outcome;
+  outcome.map.active_points = vo_->num_active_points();
+  outcome.map.keyframes = 1;
+  outcome.keyframes = {first_keyframe(frame, right_pyramid)};
+  start_outcome_ = std::move(outcome);
   return true;
 }
 

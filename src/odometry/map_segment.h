@@ -13,6 +13,7 @@
 #include "sovo/odometry/right_camera.h"
 #include "sovo/odometry/scale_path.h"
 #include "sovo/odometry/stereo_odometry.h"
+#include "sovo/odometry/stereo_start.h"
 #include "sovo/vo/monocular_backend.h"
 #include "sovo/vo/two_view_initializer.h"
 #include "sovo/vo/worker_pool.h"
@@ -59,6 +60,12 @@ struct MappingOutcome {
   std::optional<ScaleJob> scale_job;
 };
 
+/// How often images may be halved for a map to begin.
+struct Halving {
+  int most = 0;
+  bool if_clearer = false;  ///< Only where stereo depth is that much better there.
+};
+
 /// One map from its beginning to its loss: the direct odometry of the left camera, its
 /// initialization, and the scale filter.
 ///
@@ -83,11 +90,14 @@ class MapSegment {
   /// `reason()` tells what is missing.
   bool initialize(const MonoFrame& frame, const SideImage* right, const SE3& T_odom_left);
   const std::string& reason() const { return reason_; }
-  /// Whether stereo depth was sought in the last frame, and in those of some time before, in vain:
-  /// smaller images may do.
-  bool wants_halving() const;
-  /// Why stereo depth did not do in the last frame; empty: it was not sought.
-  const std::string& stereo_problem() const { return stereo_problem_; }
+  /// How stereo depth looked in the last frame; none: it was not sought.
+  const std::optional<StereoQuality>& stereo_quality() const { return stereo_quality_; }
+  /// Whether that was of whole images whose noise decides about it.
+  bool is_noisy() const;
+  /// What smaller images another map may begin in with the last frame, in place of this one: where
+  /// stereo depth was sought in vain for some time, or where noise decides about it, and that keeps
+  /// the map from beginning, or broke one at once before (`noise_broke`).
+  Halving halving(bool noise_broke) const;
   /// Tries to begin the map with the stereo depth of this frame alone.
   bool initialize_from_stereo(const MonoFrame& frame, const SideImage& right,
                               const SE3& T_odom_left);
@@ -175,8 +185,8 @@ class MapSegment {
   double window_scale_variance_ = 0.0;  ///< Mode stereo: after the last bundle adjustment.
   bool initialized_ = false;
   bool broken_ = false;
-  std::uint32_t attempts_ = 0;  ///< Frames given to `initialize`.
-  std::string stereo_problem_;  ///< In the last of them.
+  std::uint32_t attempts_ = 0;                   ///< Frames given to `initialize`.
+  std::optional<StereoQuality> stereo_quality_;  ///< In the last of them.
   std::string reason_;
   std::unique_ptr<TwoViewInitializer> two_view_initializer_;
   std::unique_ptr<PixelSelector> two_view_selector_;

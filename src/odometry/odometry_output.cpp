@@ -2,6 +2,15 @@
 
 namespace sovo {
 
+OdometryOutput output_for(const StereoFrame& frame) {
+  OdometryOutput out;
+  out.stamp_ns = frame.stamp_ns;
+  out.session = frame.session;
+  out.sequence = frame.sequence;
+  out.sync_error_s = frame.pair_error_s;
+  return out;
+}
+
 std::string to_string(OdometryState state) {
   switch (state) {
     case OdometryState::kInitializing:

@@ -9,6 +9,7 @@
 #include "sovo/geometry/se3.h"
 #include "sovo/image/image.h"
 #include "sovo/image/pyramid.h"
+#include "sovo/image/stereo_frame.h"
 #include "sovo/scale/scale_optimizer.h"
 
 namespace sovo {
@@ -94,6 +95,9 @@ struct OdometryOutput {
   double residual = 0.0;  ///< RMS of tracking [grey levels; px where features are followed].
   double distance_m = 0.0;
 };
+
+/// What is known of a frame before anything is done with it.
+OdometryOutput output_for(const StereoFrame& frame);
 
 /// A keyframe, given out twice or more. What comes later replaces what came before, as a whole.
 ///

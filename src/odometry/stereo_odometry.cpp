@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
-#include <numbers>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 
 #include "sovo/geometry/pose_covariance.h"
 #include "sovo/odometry/dead_reckoning.h"
+#include "sovo/odometry/exposure_motion.h"
 #include "sovo/odometry/frame_check.h"
 #include "sovo/odometry/frame_verdict.h"
 #include "sovo/odometry/live_threads.h"
@@ -52,7 +52,7 @@ class StereoOdometry::Impl {
   void process(const StereoFrame& frame) {
     const ScopedStage stage(observer_, Stage::kFrame);
     ++received_;
-    OdometryOutput out = new_output(frame);
+    OdometryOutput out = output_for(frame);
     const std::string refusal = check_.refuse(frame, [&] { return patience(frame.stamp_ns); });
     if (!refusal.empty()) {
       ++rejected_;
@@ -64,7 +64,7 @@ class StereoOdometry::Impl {
     }
     const std::string right_problem = check_.right_problem(frame);
     SideImage right_side = frame.right;
-    right_side.stamp_offset_ns = exposure_offset(frame);
+    right_side.stamp_offset_ns = config_.exposure_motion ? exposure_offset_ns(frame) : 0;
     const SideImage* right = right_problem.empty() ? &right_side : nullptr;
     if (segment_->initialized()) {
       follow(frame, right, right_problem, &out);
@@ -84,6 +84,7 @@ class StereoOdometry::Impl {
   void reset() {
     end_segment();
     ++reset_counter_;
+    noise_broke_ = false;
     begin_segment(new_segment(next_segment_, 0));
   }
 
@@ -96,16 +97,6 @@ class StereoOdometry::Impl {
   const ImageU8& tracked_mask() const { return preparation_.left_mask(); }
 
  private:
-  /// Of the right image to the left one [ns]; what stamps of cameras that are triggered together
-  /// err by is none.
-  std::int64_t exposure_offset(const StereoFrame& frame) const {
-    constexpr double kSigmas = 3.0;
-    const std::int64_t offset = frame.right.stamp_offset_ns - frame.left.stamp_offset_ns;
-    const double error = kSigmas * std::numbers::sqrt2 * frame.stamp_sigma_s;
-    const bool real = std::abs(kNanosecond * static_cast<double>(offset)) > error;
-    return config_.exposure_motion && real ? offset : 0;
-  }
-
   /// For how long an image that stays the same is no sign of rest [s].
   double patience(std::int64_t stamp_ns) const {
     constexpr double kUnknown = 0.25;  // most maps begin at rest
@@ -147,29 +138,41 @@ class StereoOdometry::Impl {
   }
 
   void initialize(const StereoFrame& frame, const SideImage* right, OdometryOutput* out) {
-    const MonoFrame left = preparation_.prepare_left(frame, observer_, segment_->halvings());
-    const SE3 T_odom_left = recognize(left, right).value_or(reckoning_.at(frame.stamp_ns));
-    if (segment_->initialize(left, right, T_odom_left)) {
-      begin_map(frame, left, out);
+    Start start{nullptr, preparation_.prepare_left(frame, observer_, segment_->halvings())};
+    const SE3 T_odom_left = recognize(start.left, right).value_or(reckoning_.at(frame.stamp_ns));
+    const bool begun = segment_->initialize(start.left, right, T_odom_left);
+    std::string halved;
+    if (halve(*segment_, segment_->halving(noise_broke_), frame, right, T_odom_left, &start)) {
+      halved = segment_->stereo_quality()->why_halved(start.segment->halvings());
+      set_segment(std::move(start.segment));
+    } else if (!begun) {
+      out->reason = FrameCheck::with_exposure(segment_->reason(), frame);
       return;
     }
-    out->reason = FrameCheck::with_exposure(segment_->reason(), frame);
-    if (segment_->wants_halving()) initialize_halved(frame, T_odom_left, out);
+    begin_map(frame, start.left, out);
+    if (!halved.empty()) out->reason = halved;
   }
 
-  /// What is blurred, noisy or pale at full resolution may be clear enough in smaller images.
-  void initialize_halved(const StereoFrame& frame, const SE3& T_odom_left, OdometryOutput* out) {
-    for (int halvings = 1; halvings <= preparation_.max_halvings(); ++halvings) {
-      auto segment = new_segment(segment_->index(), halvings);
+  /// A map, and the frame as that sees it.
+  struct Start {
+    std::unique_ptr<MapSegment> segment;
+    MonoFrame left;
+  };
+
+  /// What is blurred, noisy or pale at full resolution may be clear enough in smaller images:
+  /// begins a map in those with this frame, in place of `whole`.
+  bool halve(const MapSegment& whole, const Halving& may, const StereoFrame& frame,
+             const SideImage* right, const SE3& T_odom_left, Start* start) {
+    for (int halvings = 1; halvings <= may.most; ++halvings) {
+      auto segment = new_segment(whole.index(), halvings);
       const MonoFrame left = preparation_.prepare_left(frame, observer_, halvings);
-      if (!segment->initialize_from_stereo(left, frame.right, T_odom_left)) continue;
-      const std::string why = segment_->stereo_problem();
-      set_segment(std::move(segment));
-      begin_map(frame, left, out);
-      out->reason = "images are reduced to 1/" + std::to_string(1 << halvings) +
-                    " of their size, for in whole ones " + why;
-      return;
+      if (!segment->initialize_from_stereo(left, *right, T_odom_left)) continue;
+      const StereoQuality& quality = *segment->stereo_quality();
+      if (may.if_clearer && !quality.is_clearer_than(*whole.stereo_quality())) continue;
+      *start = {std::move(segment), left};
+      return true;
     }
+    return false;
   }
 
   /// The segment's first pose, after `initialize`.
@@ -324,17 +327,27 @@ class StereoOdometry::Impl {
   /// later one.
   bool begin_next_segment(const StereoFrame& frame, const SideImage* right, const SE3& T_odom_left,
                           bool over) {
+    constexpr int kYoung = 10;
     if (threads_) threads_->drain();
+    noise_broke_ = noise_broke_ || (followed_ < kYoung && segment_->is_noisy());
     auto next = new_segment(next_segment_, 0);
-    const MonoFrame left = preparation_.prepare_left(frame, observer_);
-    const bool begun = next->initialize(left, right, T_odom_left);
+    Start start{nullptr, preparation_.prepare_left(frame, observer_)};
+    bool begun = next->initialize(start.left, right, T_odom_left);
+    Halving may = next->halving(noise_broke_);
+    // Where only smaller images did so far, they need not wait.
+    const int known = segment_->halvings();
+    if (!begun && known > 0 && next->stereo_quality()) may = {known, false};
+    if (halve(*next, may, frame, right, T_odom_left, &start)) {
+      next = std::move(start.segment);
+      begun = true;
+    }
     if (!begun && !over) return false;
     end_segment();
     sync_failed_ = false;
     begin_segment(begun ? std::move(next) : new_segment(next_segment_, 0));
     OdometryOutput not_published;
     not_published.stamp_ns = frame.stamp_ns;
-    if (begun) begin_map(frame, left, &not_published);
+    if (begun) begin_map(frame, start.left, &not_published);
     return true;
   }
 
@@ -366,15 +379,6 @@ class StereoOdometry::Impl {
     map_points_ = static_cast<std::uint32_t>(outcome.map.active_points);
     map_keyframes_ = static_cast<std::uint32_t>(outcome.map.keyframes);
     co_moving_share_ = outcome.map.co_moving_share;
-  }
-
-  OdometryOutput new_output(const StereoFrame& frame) const {
-    OdometryOutput out;
-    out.stamp_ns = frame.stamp_ns;
-    out.session = frame.session;
-    out.sequence = frame.sequence;
-    out.sync_error_s = frame.pair_error_s;
-    return out;
   }
 
   void fill_counters(OdometryOutput* out) const {
@@ -459,8 +463,9 @@ class StereoOdometry::Impl {
   std::optional<Published> published_;
   DeadReckoning reckoning_;
   double distance_ = 0.0;
-  int failures_ = 0;  ///< Frames in a row without a pose.
-  int followed_ = 0;  ///< Frames of the segment with a pose, but for its first.
+  int failures_ = 0;          ///< Frames in a row without a pose.
+  int followed_ = 0;          ///< Frames of the segment with a pose, but for its first.
+  bool noise_broke_ = false;  ///< A map of whole, noisy images, which did not last.
   bool sync_failed_ = false;
   std::uint64_t received_ = 0;
   std::uint64_t rejected_ = 0;

@@ -29,9 +29,10 @@ constexpr double kFitsBadly = 0.85;
 constexpr std::size_t kLeastRest = 100;  ///< Points.
 constexpr int kOftenFailed = 4;          ///< Then frames are left out, the more the oftener,
 constexpr int kMostFailed = 8;           ///< until it is every 16th one that is looked at.
-/// Of the mean depth, of a frame of which no motion is known.
+// Of a frame of which no motion is known, in mean depths:
 constexpr std::array kUnknownShares = {0.02, 0.04, 0.07, 0.11, 0.16, 0.21, 0.27, 0.33, 0.4, 0.48};
-constexpr std::size_t kStartsAhead = 44;  ///< Of all of them, those that fit best as they are.
+constexpr double kFarthestUnknown = 0.75;  ///< What was found farther on was never right.
+constexpr std::size_t kStartsAhead = 44;   ///< Of all of them, those that fit best as they are.
 constexpr double kAheadStep = 0.02;  ///< And of those straight on or back that are looked at again.
 
 /// Motions to try when none of the likely ones fits: a camera that was knocked turns by another
@@ -113,7 +114,8 @@ TrackingResult DirectOdometry::track_from_any(const TrackingReference& reference
   // The first hypothesis is where the camera is expected or recognized, if anything tells that.
   const bool near_expected =
       !place_unknown_ && is_near(found * hypotheses_.front().inverse(), reference.mean_rho);
-  if (!near_expected && !is_near(found, reference.mean_rho)) out.good = false;
+  const double farthest = place_unknown_ ? kFarthestUnknown : 1.0;
+  if (!near_expected && !is_near(found, reference.mean_rho, farthest)) out.good = false;
   return out;
 }
 
@@ -157,7 +159,8 @@ TrackingResult DirectOdometry::search_ahead(const TrackingReference& reference,
                                              starts, kStartsAhead)) {
     const TrackingResult tried =
         tracker_.refine(reference, *frame.pyramid, frame.exposure_s, affine, start, past_.tracking);
-    if (!tried.good || !is_near(tried.T_current_reference, reference.mean_rho)) continue;
+    const SE3& T_tried = tried.T_current_reference;
+    if (!tried.good || !is_near(T_tried, reference.mean_rho, kFarthestUnknown)) continue;
     const double rest = unexplained(tried);
     if (rest < least) {
       least = rest;

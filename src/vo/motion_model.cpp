@@ -37,8 +37,8 @@ bool is_reachable(const KnownMotion& known, const SE3& T_current_reference) {
   return way_off(known, T_current_reference) <= known.reach;
 }
 
-bool is_near(const SE3& motion, double mean_rho) {
-  return motion.translation().norm() * mean_rho < 1.0;
+bool is_near(const SE3& motion, double mean_rho, double farthest) {
+  return motion.translation().norm() * mean_rho < farthest;
 }
 
 double deviation(const KnownMotion& known, const SE3& T_current_reference) {

@@ -33,8 +33,8 @@ bool is_reachable(const KnownMotion& known, const SE3& T_current_reference);
 
 /// Whether a camera can have moved so from the reference, or from where it is expected: from a mean
 /// depth away hardly any point looks the same. `mean_rho`: of the reference's points, in one over
-/// the unit of `motion`.
-bool is_near(const SE3& motion, double mean_rho);
+/// the unit of `motion`; `farthest`: how many mean depths it may be.
+bool is_near(const SE3& motion, double mean_rho, double farthest = 1.0);
 
 /// How far a camera was found from where it was expected, in `KnownMotion::sigma`; 0: unknown.
 double deviation(const KnownMotion& known, const SE3& T_current_reference);

@@ -124,6 +124,21 @@ TEST(HalvedImages, AClearImageIsTrackedWholeAgainAfterAReset) {
   EXPECT_EQ(out.segment, 1U);
 }
 
+TEST(HalvedImages, WhereTheyAreNeededTheNextMapNeedNotWaitForThem) {
+  constexpr int kElsewhere = 200;
+  Playback run(test_config());
+  for (int i = 0; i < 20; ++i) run.give(blurred_frame(i));
+  ASSERT_EQ(run.recorder.frames.back().halvings, 1);
+  int lost = 0;
+  for (; lost < 10 && run.recorder.frames.back().segment == 0; ++lost) {
+    EXPECT_EQ(run.give(blurred_frame(kElsewhere + lost)).state, OdometryState::kLost);
+  }
+  const OdometryOutput out = run.give(blurred_frame(kElsewhere + lost));
+  EXPECT_TRUE(out.pose_valid) << out.reason;
+  EXPECT_EQ(out.segment, 1U);
+  EXPECT_EQ(out.halvings, 1);
+}
+
 TEST(HalvedImages, LiveThreadsTakeThemToo) {
   StereoOdometryConfig config = test_config();
   config.deterministic = false;

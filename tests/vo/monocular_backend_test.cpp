@@ -106,6 +106,17 @@ TEST_P(Backend, WhereMotionIsKnownItMayBeMoreThanAMeanDepth) {
   EXPECT_LT(off.translation().norm(), 0.03 * depth);
 }
 
+TEST_P(Backend, WhereNoMotionIsKnownPixelsAreBelievedLessFar) {
+  const bool direct = GetParam() == Kind::kDirect;
+  for (const double way : {0.6, 0.8}) {
+    vo_ = new_backend(GetParam(), &pool_);
+    begin(first_, vo_.get());
+    const SE3 back(SO3(), Vec3(0.0, 0.0, -way / vo_->reference()->mean_rho));
+    const bool good = vo_->track(frame_at(scene_, back, 1), 0.0).tracking.good;
+    EXPECT_EQ(good, !direct || way < 0.75) << way;
+  }
+}
+
 TEST_P(Backend, NothingIsBelievedAMeanDepthFromTheReferenceAndFromWhereItIsExpected) {
   const auto at = [&](double depths) {
     return SE3(SO3(), Vec3(0.0, 0.0, -depths / vo_->reference()->mean_rho));

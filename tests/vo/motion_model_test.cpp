@@ -100,6 +100,8 @@ TEST(MotionModel, WhatIsSeenFromAMeanDepthAwayIsNotFoundByChance) {
   const SO3 turned = SO3::exp(Vec3(0.5, 0, 0));
   EXPECT_TRUE(is_near(SE3(turned, Vec3(0, 0, 3.9)), 0.25));
   EXPECT_FALSE(is_near(SE3(turned, Vec3(0, 0, 4.1)), 0.25));
+  EXPECT_TRUE(is_near(SE3(turned, Vec3(0, 0, 1.9)), 0.25, 0.5));
+  EXPECT_FALSE(is_near(SE3(turned, Vec3(0, 0, 2.1)), 0.25, 0.5));
 }
 
 TEST(MotionModel, UsualAccelerationsAreATenthOfTheGreatest) {

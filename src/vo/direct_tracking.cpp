@@ -31,7 +31,7 @@ constexpr int kOftenFailed = 4;          ///< Then frames are left out, the more
 constexpr int kMostFailed = 8;           ///< until it is every 16th one that is looked at.
 // Of a frame of which no motion is known, in mean depths:
 constexpr std::array kUnknownShares = {0.02, 0.04, 0.07, 0.11, 0.16, 0.21, 0.27, 0.33, 0.4, 0.48};
-constexpr double kFarthestUnknown = 0.75;  ///< What was found farther on was never right.
+constexpr double kFarthestUnknown = 0.75;  ///< What leads farther fits by chance.
 constexpr std::size_t kStartsAhead = 44;   ///< Of all of them, those that fit best as they are.
 constexpr double kAheadStep = 0.02;  ///< And of those straight on or back that are looked at again.
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include "sovo/image/halving.h"
 #include "sovo/odometry/new_backend.h"
@@ -18,6 +19,9 @@ namespace {
 constexpr std::uint32_t kStereoEvery = 5;
 /// Of a camera of which nothing is known yet [m/s].
 constexpr double kUnknownSpeed = 1.0;
+/// Share of the pixels that agree. Of flights with a turned right camera hardly ever have two
+/// keyframes in a row less, under strong caustics nearly all have.
+constexpr double kFitsBadly = 0.77;
 /// So many keyframes wait for a scale, the newest ones: a map may go without one for days.
 constexpr std::size_t kMostWaiting = 200;
 
@@ -305,6 +309,9 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
   if (use_right && config_.mode != OdometryMode::kMono && vo_->snapshot()) {
     job.snapshot = *vo_->snapshot();
     job.cold_start = filter_.wants_cold_start();
+    const bool fits_badly =
+        config_.backend == Backend::kDirect && tracked.tracking.inlier_ratio < kFitsBadly;
+    job.fits_badly = std::exchange(fits_badly_, fits_badly) && fits_badly;
     out.scale_job = std::move(job);
   }
   return out;
@@ -325,6 +332,7 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
   const double pending = vo_->log_scale() - job.snapshot.log_scale;
   ScaleMeasurement m;
   m.estimate = estimate;
+  m.estimate.turn.doubtful = job.fits_badly;
   filter_.widen(right_.note(job.turn, &m.estimate));
   m.cold_start = job.cold_start;
   m.stamp_ns = job.snapshot.stamp_ns;

@@ -45,6 +45,8 @@ struct ScaleJob {
   SO3 turn;                      ///< Of the right camera, as it is undone here.
   double pyramid_seconds = 0.0;  ///< What the right pyramid cost.
   bool cold_start = false;
+  /// The left image, and that of the keyframe before: the depths of the map may be wrong.
+  bool fits_badly = false;
 
   /// `T_later_left` with the turn in it, where lengths are metres: as if the left camera had
   /// turned.
@@ -197,6 +199,7 @@ class MapSegment {
   std::vector<SE3> refined_;             ///< Refined poses of all keyframes.
   std::size_t refined_until_ = 0;        ///< Those before this one do not change any more.
 
+  bool fits_badly_ = false;  ///< The last keyframe.
   std::optional<Vec3> last_keyframe_position_;
   ScalePath scale_path_;
   mutable std::mutex status_mutex_;

@@ -10,7 +10,7 @@ struct StereoAssistConfig {
   double min_inliers = 0.65;   ///< Share of pixels that agree, below which it is called.
   int disagreements = 2;       ///< Scales in a row that disagree, which call it.
   int good_keyframes = 3;      ///< In a row, after which it goes.
-  bool hold_scale = true;      ///< Static residuals while the scale sees too few points.
+  bool hold_scale = true;      ///< Static residuals where no scale is measured.
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -20,15 +20,17 @@ struct StereoAssistConfig {
     v("disagreements", disagreements, "scales in a row that disagree, which call it");
     v("good_keyframes", good_keyframes, "good keyframes in a row after which it goes");
     v("hold_scale", hold_scale,
-      "mode scale, direct, unless depth_init is temporal: while scale optimization sees too few "
-      "points, new keyframes get static residuals");
+      "mode scale, direct, unless depth_init is temporal: where scale optimization sees too few "
+      "points or disagrees, new keyframes get static residuals");
   }
 };
 
 /// Tells when the monocular odometry fails and stereo matching must help it (the future work of the
 /// paper): while too few points find their depth in later images, tracking fits badly or the scale
 /// jumps, new pixels get their depths from the right image at once. And where points leave the view
-/// so soon that too few are left for scale optimization, static residuals hold the scale.
+/// so soon that too few are left for scale optimization, or what it finds is no scale that the map
+/// can have come to, static residuals hold the scale: moving light bends the depths of a map, which
+/// the right image, taken in the same light, does not share.
 class StereoAssist {
  public:
   explicit StereoAssist(const StereoAssistConfig& config) : config_(config) {}
@@ -53,7 +55,9 @@ class StereoAssist {
   void on_scale(ScaleVerdict verdict) {
     disagreed_ = verdict == ScaleVerdict::kInnovation ? disagreed_ + 1 : 0;
     measured_ = verdict == ScaleVerdict::kAccepted ? measured_ + 1 : 0;
-    if (verdict == ScaleVerdict::kTooFewPoints) holds_scale_ = config_.hold_scale;
+    const bool fails =
+        verdict == ScaleVerdict::kTooFewPoints || verdict == ScaleVerdict::kInnovation;
+    if (fails) holds_scale_ = config_.hold_scale;
     if (measured_ >= config_.good_keyframes) holds_scale_ = false;
   }
 

@@ -21,6 +21,9 @@ constexpr double kStays = 0.85;      ///< Of their distance, which the newest ha
 constexpr double kLeast = 0.25;      ///< Of the threshold, once it was exceeded.
 constexpr double kSurePx = 0.25;     ///< What lenses look like at most, where they always do.
 constexpr double kSureSigmas = 1.3;  ///< Nine of ten keyframes lie on this side of it.
+/// Weight of a keyframe that hardly fits the map. Light that moves over what is seen bends the
+/// depths of a young map, which looks like a yaw of up to two pixels.
+constexpr double kDoubtfulWeight = 0.25;
 
 }  // namespace
 
@@ -34,14 +37,15 @@ void RightTurn::note(const RightTurnEstimate& found, const SO3& given) {
     Axis& axis = axes_[static_cast<std::size_t>(i)];
     axis.in_doubt = false;
     if (focal_ * found.sigma[i] < kUnseenPx) {
-      note(total[i], focal_ * found.disagreement[i], &axis);
+      const double weight = found.doubtful ? kDoubtfulWeight : 1.0;
+      note({total[i], focal_ * found.disagreement[i], weight}, &axis);
     }
   }
   const bool before = decalibrated_;
   decalibrated_ = config_.undo && exceeds(before ? kLeast : 1.0);
   // With another turn the map becomes another one, which shows it better.
   if (decalibrated_ && !before) {
-    for (Axis& axis : axes_) axis.turns.averaged = std::min(axis.turns.averaged, 1);
+    for (Axis& axis : axes_) axis.turns.averaged = std::min(axis.turns.averaged, 1.0);
   }
   turn_ = decalibrated_ ? SO3::exp(certain_px() / focal_) : SO3();
 }
@@ -69,16 +73,17 @@ bool RightTurn::in_doubt() const {
          std::any_of(axes_.begin(), axes_.end(), [](const Axis& axis) { return axis.in_doubt; });
 }
 
-void RightTurn::note(double px, double disagreement_px, Axis* axis) const {
+void RightTurn::note(const KeyframeTurn& seen, Axis* axis) const {
+  const double px = seen.px;
   const double away = std::abs(px - axis->turns.mean) / (config_.gate_sigmas * spread(axis->turns));
   const bool known = axis->turns.count >= kFewest && std::abs(px - axis->turns.mean) > kSurePx;
   axis->in_doubt = known && away > kInDoubt;
   if (!known || away < kFar) {
-    axis->turns.add(px, disagreement_px, config_.memory);
+    axis->turns.add(seen, config_.memory);
     axis->astray = {};
     return;
   }
-  axis->astray.add(px, disagreement_px, config_.memory);
+  axis->astray.add(seen, config_.memory);
   const double moved = std::abs(axis->astray.mean - axis->turns.mean);
   // Those that do not agree with each other either are the scatter of another place, and what
   // goes back again comes of a map that is being mended.
@@ -90,14 +95,14 @@ void RightTurn::note(double px, double disagreement_px, Axis* axis) const {
   }
 }
 
-void RightTurn::Turns::add(double px, double disagreement_px, int memory) {
-  count = std::min(count + 1, memory);
-  averaged = std::min(averaged + 1, memory);
-  const double share = 1.0 / averaged;
-  const double innovation = px - mean;
+void RightTurn::Turns::add(const KeyframeTurn& seen, int memory) {
+  count = std::min(count + seen.weight, 1.0 * memory);
+  averaged = std::min(averaged + seen.weight, 1.0 * memory);
+  const double share = seen.weight / averaged;
+  const double innovation = seen.px - mean;
   mean += share * innovation;
   variance = (1.0 - share) * (variance + share * innovation * innovation);
-  disagreement += share * (disagreement_px * disagreement_px - disagreement);
+  disagreement += share * (seen.disagreement_px * seen.disagreement_px - disagreement);
 }
 
 Vec3 RightTurn::mean_px() const {

@@ -54,21 +54,27 @@ class RightTurn {
   Vec3 mean_px() const;
 
  private:
+  /// What a keyframe shows about an axis [px].
+  struct KeyframeTurn {
+    double px = 0.0;
+    double disagreement_px = 0.0;
+    double weight = 1.0;  ///< 1 for a keyframe that fits the map.
+  };
   /// Of the turns that keyframes show about an axis.
   struct Turns {
     double mean = 0.0, variance = 0.0;  ///< [px, px^2]
     double disagreement = 0.0;          ///< Mean square of that within keyframes [px^2].
-    int count = 0;                      ///< `memory` at most.
-    int averaged = 0;                   ///< Of them, those that the mean is made of.
+    double count = 0.0;                 ///< By their weights, `memory` at most.
+    double averaged = 0.0;              ///< Of them, those that the mean is made of.
 
-    void add(double px, double disagreement_px, int memory);
+    void add(const KeyframeTurn& seen, int memory);
   };
   struct Axis {
     Turns turns;
     Turns astray;  ///< Those since the last keyframe that was not far from the mean.
     bool in_doubt = false;
   };
-  void note(double px, double disagreement_px, Axis* axis) const;
+  void note(const KeyframeTurn& seen, Axis* axis) const;
   bool exceeds(double part) const;
   Vec3 certain_px() const;
   double spread(const Turns& turns) const;

@@ -106,6 +106,13 @@ class Robustness(SimTest):
                                    **sensor)
             self.expect_whole(truth, live, 0.5)
 
+    def test_sunlight_that_moves_over_the_floor(self):
+        # It bends the depths of a map: that is no turn of the right camera, and no scale.
+        sun = ("--set", "sim.seed=2", "--set", "sim.caustics=2")
+        truth, live = self.fly("pool", "--frames", 80, *sun)
+        self.expect_whole(truth, live, 0.05)
+        self.assertNotIn("turned", self.log)
+
     def test_the_light_changes_at_once(self):
         truth, live = self.fly("hall", "--frames", 110, light_factor=0.35, light_from_s=1.5,
                                light_until_s=3)

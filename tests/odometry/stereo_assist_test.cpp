@@ -61,26 +61,29 @@ TEST(StereoAssist, ComesWhenTheScaleJumps) {
   EXPECT_FALSE(assist.wanted());
 }
 
-TEST(StereoAssist, HoldsTheScaleWhileItSeesTooFewPoints) {
-  StereoAssist assist({});
-  for (const ScaleVerdict verdict : {ScaleVerdict::kAccepted, ScaleVerdict::kInnovation,
-                                     ScaleVerdict::kUnobservable, ScaleVerdict::kNoRightImage}) {
-    assist.on_scale(verdict);
-    EXPECT_FALSE(assist.holds_scale());
+TEST(StereoAssist, HoldsTheScaleWhileNoneIsMeasured) {
+  StereoAssist unaware({});
+  for (const ScaleVerdict verdict :
+       {ScaleVerdict::kAccepted, ScaleVerdict::kUnobservable, ScaleVerdict::kNoRightImage}) {
+    unaware.on_scale(verdict);
+    EXPECT_FALSE(unaware.holds_scale());
   }
-  assist.on_scale(ScaleVerdict::kTooFewPoints);
-  assist.on_scale(ScaleVerdict::kAccepted);
-  assist.on_scale(ScaleVerdict::kAccepted);
-  assist.on_scale(ScaleVerdict::kInnovation);
-  assist.on_scale(ScaleVerdict::kAccepted);
-  assist.on_scale(ScaleVerdict::kAccepted);
-  EXPECT_TRUE(assist.holds_scale()) << "three in a row";
-  assist.on_scale(ScaleVerdict::kAccepted);
-  EXPECT_FALSE(assist.holds_scale());
+  for (const ScaleVerdict fails : {ScaleVerdict::kTooFewPoints, ScaleVerdict::kInnovation}) {
+    StereoAssist assist({});
+    assist.on_scale(fails);
+    assist.on_scale(ScaleVerdict::kAccepted);
+    assist.on_scale(ScaleVerdict::kAccepted);
+    assist.on_scale(ScaleVerdict::kUnobservable);
+    assist.on_scale(ScaleVerdict::kAccepted);
+    assist.on_scale(ScaleVerdict::kAccepted);
+    EXPECT_TRUE(assist.holds_scale()) << "three in a row";
+    assist.on_scale(ScaleVerdict::kAccepted);
+    EXPECT_FALSE(assist.holds_scale());
 
-  StereoAssist never({.hold_scale = false});
-  never.on_scale(ScaleVerdict::kTooFewPoints);
-  EXPECT_FALSE(never.holds_scale());
+    StereoAssist never({.hold_scale = false});
+    never.on_scale(fails);
+    EXPECT_FALSE(never.holds_scale());
+  }
 }
 
 class StageCounter : public StageObserver {

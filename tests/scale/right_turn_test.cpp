@@ -18,7 +18,7 @@ class Keyframes {
   explicit Keyframes(const RightTurnConfig& config = {}) : turn(config, kFocal) {}
 
   void see(const Vec3& px, int count, double scatter_px = 0.02, double sigma_px = 0.03,
-           double disagreement_px = 0.0) {
+           double disagreement_px = 0.0, bool doubtful = false) {
     std::normal_distribution<double> normal(0.0, scatter_px);
     for (int i = 0; i < count; ++i) {
       const Vec3 noise(normal(random_), normal(random_), normal(random_));
@@ -28,7 +28,8 @@ class Keyframes {
                  (total * given.inverse()).log(),
                  Vec3::Constant(sigma_px / kFocal),
                  {},
-                 Vec3::Constant(disagreement_px / kFocal)},
+                 Vec3::Constant(disagreement_px / kFocal),
+                 doubtful},
                 given);
     }
   }
@@ -128,6 +129,21 @@ TEST(RightTurn, WhatPartsOfTheImageDisagreeAboutIsNone) {
     turned.see({0, 0.8, 0}, count, 0.02, 0.03, 0.04);
     EXPECT_TRUE(turned.turn.decalibrated()) << count;
   }
+}
+
+// Light that moves over what is seen bends the depths of a map until that is left behind.
+TEST(RightTurn, KeyframesThatHardlyFitTellLess) {
+  Keyframes bent;
+  bent.see({0, -2, 0}, 8, 0.15, 0.07, 0.1, true);
+  EXPECT_FALSE(bent.turn.decalibrated());
+  bent.see({0, 0, 0}, 40, 0.05, 0.07);
+  EXPECT_FALSE(bent.turn.decalibrated());
+  EXPECT_NEAR(bent.turn.mean_px().y(), -2.0 * 2.0 / 42.0, 0.05) << "each has a quarter's weight";
+
+  Keyframes turned;
+  turned.see({0, -2, 0}, 20, 0.15, 0.07, 0.1, true);
+  EXPECT_TRUE(turned.turn.decalibrated()) << "but many tell it, too";
+  EXPECT_NEAR(undone_px(turned.turn).y(), -2.0, 0.2);
 }
 
 TEST(RightTurn, IsNotInDoubtForLong) {

@@ -178,6 +178,7 @@ struct SimConfig {
   std::string trajectory_times;
   TrajectoryBody trajectory_body = TrajectoryBody::kAuto;
   Traffic traffic = Traffic::kNone;
+  double caustics = 1.0;
   bool own_shadow = false;
   Body own_body = Body::kNone;
   int threads = 2;
@@ -205,6 +206,8 @@ struct SimConfig {
     v("traffic", traffic,
       "vehicles that move on the road: none, car or lorry ahead, overtaking, oncoming, or busy for "
       "all but the lorry");
+    v("caustics", caustics,
+      "the sun's light that waves throw over the pool's floor, over what suits it; 0: none");
     v("own_shadow", own_shadow, "a rover carries the cameras, whose shadow moves with them");
     v("own_body", own_body, "what the cameras see of their vehicle: none, bonnet or arms");
     v("threads", threads, "1 or 2: cameras rendered at once; changes no pixel");

@@ -69,6 +69,13 @@ OwnBody own_body(const SimConfig& config, const StereoRig& rig, Side side, doubl
   return {config.own_body, rig, side, rays, place_lamps(config.lamps, rig, side, haze)};
 }
 
+/// The world as the configuration has it.
+Scene scene_of(const SimConfig& config, const Motion& motion) {
+  Scene scene = build_scene(config.world, motion, config.seed, config.traffic);
+  scene.caustic_strength *= static_cast<float>(config.caustics);
+  return scene;
+}
+
 OwnShadow own_shadow(const SimConfig& config, const StereoRig& rig, Side side) {
   return config.own_shadow ? OwnShadow(rig, side) : OwnShadow();
 }
@@ -97,6 +104,9 @@ Result<void> check(const SimConfig& config) {
   if (config.frames < 0) return Error{"frames must not be negative"};
   if (config.frame_rate < 0.0 || config.frame_rate > 1000.0) {
     return Error{"frame_rate must be at most 1000 Hz, or 0 for the world's own"};
+  }
+  if (!(config.caustics >= 0.0 && config.caustics <= 5.0)) {
+    return Error{"caustics must be in [0, 5]"};
   }
   const bool road = config.world == World::kStreet || config.world == World::kHighway;
   if (config.traffic != Traffic::kNone && !road) {
@@ -137,7 +147,7 @@ SimSource::SimSource(const SimConfig& config, Calibration calibration, Motion mo
     : config_(config),
       calibration_(std::move(calibration)),
       motion_(std::move(motion)),
-      scene_(build_scene(config.world, motion_, config.seed, config.traffic)),
+      scene_(scene_of(config, motion_)),
       frame_rate_(config.frame_rate > 0.0 ? config.frame_rate : own_frame_rate(config.world)),
       delivered_(choose_pairs(config, motion_, frame_rate_)),
       left_(scene_, calibration_.rig.left,

@@ -218,6 +218,7 @@ TrackingResult DirectOdometry::found_or_at_rest(const TrackingReference& referen
   TrackingResult still = tracker_.track(without(reference, cells, moving), *frame.pyramid,
                                         frame.exposure_s, found.affine, std::array{SE3()}, {});
   if (!is_at_rest(still, reference) || share(still.T_current_reference) < enough) return found;
+  if (known_motion_ && !is_reachable(*known_motion_, still.T_current_reference)) return found;
   still.inlier_ratio =
       1.0 - tracker_.fit(reference, image, still.T_current_reference, transfer).misfits;
   return still;

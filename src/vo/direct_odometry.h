@@ -127,11 +127,6 @@ class DirectOdometry final : public MonocularBackend {
                             const SE3& T_current_reference) const;
   /// Whether a pose is that of the reference: its points move by a pixel or so.
   bool is_at_rest(const TrackingResult& tracked, const TrackingReference& reference) const;
-  /// `found`, or rest: where a pose that is near that explains far less of the image than standing
-  /// still does to a part of a pixel. Something that is rigid and strong moves then before a camera
-  /// at rest, as the surface of water seen from below, and drags the pose along.
-  TrackingResult found_or_at_rest(const TrackingReference& reference, const MonoFrame& frame,
-                                  TrackingResult found);
   /// Whether the image speaks against a pose: much of it moves before a camera at rest, or stays
   /// where it should have moved.
   bool is_doubtful(const TrackingReference& reference, const MonoFrame& frame,

@@ -21,10 +21,6 @@ constexpr double kAtRest = 1.5;     ///< RMS flow of a camera at rest [px of a V
 constexpr double kMisfits = 0.3;    ///< Share of the rest that does not agree with that,
 constexpr double kFits = 0.8;       ///< and of it that agrees with its own motion,
 constexpr double kLess = 0.5;       ///< when misfits come down to this share.
-// When the camera may be at rest, and something else moves.
-constexpr double kNearRest = 6.0;    ///< RMS flow of a pose that may be wrong by that [px of VGA],
-constexpr double kLeastStays = 0.3;  ///< Share of points that are where they were,
-constexpr double kMoreStays = 1.25;  ///< over that of those that are where the pose takes them.
 // When much agrees better in its place than where the motion takes it.
 constexpr double kFitsBetter = 0.75;  ///< Share of the rest that agrees with another motion,
 constexpr double kLessEnergy = 0.6;   ///< which brings its energy down to this share.
@@ -198,32 +194,6 @@ bool DirectOdometry::is_at_rest(const TrackingResult& tracked,
   return motion.flow_total < kAtRest * pixels_for_one_of_vga(camera_);
 }
 
-TrackingResult DirectOdometry::found_or_at_rest(const TrackingReference& reference,
-                                                const MonoFrame& frame, TrackingResult found) {
-  if (!config_.co_moving.enable || !found.good) return found;
-  const PointMotion motion = motion_of_points(reference.levels[0], found.T_current_reference,
-                                              std::numeric_limits<double>::infinity());
-  if (motion.flow_total > kNearRest * pixels_for_one_of_vga(camera_)) return found;
-  const ImageF& image = frame.pyramid->level(0);
-  const BrightnessTransfer transfer =
-      brightness_transfer(reference.affine, reference.exposure_s, found.affine, frame.exposure_s);
-  const auto share = [&](const SE3& T_current_reference) {
-    return agreeing_share(config_.co_moving, reference, image, T_current_reference, transfer);
-  };
-  const double enough = std::max(kLeastStays, kMoreStays * share(found.T_current_reference));
-  if (share(SE3()) < enough) return found;
-  const ImageCells cells(config_.co_moving.cell, camera_.width, camera_.height);
-  ChosenCells moving = staying_cells(config_.co_moving, cells, reference, image, transfer);
-  for (auto& cell : moving) cell = cell == 0 ? 1 : 0;
-  TrackingResult still = tracker_.track(without(reference, cells, moving), *frame.pyramid,
-                                        frame.exposure_s, found.affine, std::array{SE3()}, {});
-  if (!is_at_rest(still, reference) || share(still.T_current_reference) < enough) return found;
-  if (known_motion_ && !is_reachable(*known_motion_, still.T_current_reference)) return found;
-  still.inlier_ratio =
-      1.0 - tracker_.fit(reference, image, still.T_current_reference, transfer).misfits;
-  return still;
-}
-
 std::optional<TrackingResult> DirectOdometry::align_rest(const TrackingReference& reference,
                                                          const MonoFrame& frame,
                                                          TrackingResult* before,
@@ -290,8 +260,7 @@ MotionEvidence DirectOdometry::evidence_of(const TrackingReference& reference,
 TrackingResult DirectOdometry::align_whole_or_rest(const TrackingReference& reference,
                                                    const MonoFrame& frame,
                                                    std::shared_ptr<const FrameViews>* views) {
-  const TrackingResult near = found_or_at_rest(reference, frame, align(reference, frame));
-  const TrackingResult found = whole_or_rest(reference, frame, near, views);
+  const TrackingResult found = whole_or_rest(reference, frame, align(reference, frame), views);
   if (!place_unknown_ || !found.good || *views != nullptr) return found;
   const TrackingResult better = search_ahead(reference, frame, found);
   const bool same =

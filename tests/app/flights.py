@@ -47,11 +47,6 @@ def knocked(t):
             turned(yaw + 0.2 * math.sin(0.6 * t), pitch))
 
 
-def at_rest(_):
-    """Where it is."""
-    return [0, 0, 0], turned(0)
-
-
 def rest_motion_rest(t):
     """From rest after half a second, to rest again after three."""
     return [1.5 * eased(t, 0.5, 3), 0.8 * eased(t, 0.5, 3), 0], turned(0)

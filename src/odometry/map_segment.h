@@ -199,7 +199,7 @@ class MapSegment {
   std::vector<SE3> refined_;             ///< Refined poses of all keyframes.
   std::size_t refined_until_ = 0;        ///< Those before this one do not change any more.
 
-  bool fits_badly_ = false;  ///< The last keyframe.
+  bool fits_badly_ = false;  ///< The last keyframe's left image did.
   std::optional<Vec3> last_keyframe_position_;
   ScalePath scale_path_;
   mutable std::mutex status_mutex_;

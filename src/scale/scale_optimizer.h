@@ -104,7 +104,8 @@ struct RightTurnEstimate {
   /// By how much more parts of the image disagree than `sigma` explains, as of a lens that is
   /// described badly [rad].
   Vec3 disagreement = Vec3::Zero();
-  /// The keyframe's image hardly fits the map, whose depths are then wrong, too.
+  /// The keyframe's image hardly fits the map, whose depths may then be wrong, too: said by who
+  /// tracked it.
   bool doubtful = false;
 };
 

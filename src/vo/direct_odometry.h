@@ -77,6 +77,9 @@ class DirectOdometry final : public MonocularBackend {
     int rest_failed = 0;    ///< How often in a row another motion of the rest was sought in vain,
     int rest_waits = 0;     ///< and the frames until it is sought again.
     bool motion_confirmed = false;  ///< Though much stays in its place, when it was sought last.
+    bool stands = false;            ///< Though much moves, or goes on slowly from there:
+    ChosenCells moving;             ///< the cells in which it moved,
+    std::uint32_t moving_keyframe = 0;  ///< and of which reference.
   };
 
   void trace_all(const MonoFrame& frame, const SE3& T_world_camera, const Affine& affine);
@@ -125,8 +128,21 @@ class DirectOdometry final : public MonocularBackend {
                               TrackingResult found);
   TrackingReference as_seen(const TrackingReference& reference, const RowShift& rows,
                             const SE3& T_current_reference) const;
+  /// By how much a pose moves the reference's points, RMS [px of a VGA image].
+  double flow_of(const SE3& T_current_reference, const TrackingReference& reference) const;
   /// Whether a pose is that of the reference: its points move by a pixel or so.
   bool is_at_rest(const TrackingResult& tracked, const TrackingReference& reference) const;
+  /// `found`, or what explains more of the image: that the camera is still at rest, or goes on
+  /// slowly from there, while something rigid and strong moves before it, as the surface of water
+  /// does that is seen from below. That drags a pose along.
+  TrackingResult found_or_at_rest(const TrackingReference& reference, const MonoFrame& frame,
+                                  TrackingResult found);
+  /// Notes what moves before a camera at rest; not where what stays may be its own vehicle.
+  bool note_moving(const TrackingReference& reference, const ImageF& image,
+                   const BrightnessTransfer& transfer);
+  /// A frame by what does not move so, from the `last` pose on.
+  TrackingResult track_standing(const TrackingReference& reference, const MonoFrame& frame,
+                                const Affine& affine, const SE3& last);
   /// Whether the image speaks against a pose: much of it moves before a camera at rest, or stays
   /// where it should have moved.
   bool is_doubtful(const TrackingReference& reference, const MonoFrame& frame,

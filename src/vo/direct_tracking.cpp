@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "sovo/vo/direct_odometry.h"
 #include "sovo/vo/image_change.h"
@@ -21,6 +22,12 @@ constexpr double kAtRest = 1.5;     ///< RMS flow of a camera at rest [px of a V
 constexpr double kMisfits = 0.3;    ///< Share of the rest that does not agree with that,
 constexpr double kFits = 0.8;       ///< and of it that agrees with its own motion,
 constexpr double kLess = 0.5;       ///< when misfits come down to this share.
+// When the camera may be at rest, and something else moves.
+constexpr double kNearRest = 6.0;    ///< RMS flow of a pose that may be wrong by that [px of VGA].
+constexpr double kLeastStays = 0.3;  ///< Share of points that are where they were, and that over
+constexpr double kMoreStays = 1.25;  ///< the share where the pose takes them; less once it stands,
+constexpr double kLeastBeforeLeap = 0.2;  ///< and from there a leap has to explain
+constexpr double kMoreBeforeLeap = 0.6;   ///< so much that what stood is this share of it.
 // When much agrees better in its place than where the motion takes it.
 constexpr double kFitsBetter = 0.75;  ///< Share of the rest that agrees with another motion,
 constexpr double kLessEnergy = 0.6;   ///< which brings its energy down to this share.
@@ -61,6 +68,14 @@ bool is_nearly(const SE3& a, const SE3& b, double mean_rho) {
   const SE3 difference = a * b.inverse();
   return difference.rotation().log().norm() < kTurn &&
          difference.translation().norm() * mean_rho < kShift;
+}
+
+/// Share of the points that must be where a camera at rest sees them, or one that goes on from rest
+/// where it `stood`, by the share that is where a pose takes them; `leaps`: far from the last one.
+double enough_stays(bool stood, bool leaps, double moved) {
+  if (!stood) return std::max(kLeastStays, kMoreStays * moved);
+  if (!leaps) return std::max(kLeastStays, moved / kMoreStays);
+  return std::max(kLeastBeforeLeap, kMoreBeforeLeap * moved);
 }
 
 /// Whether a pose is likelier than another by its residuals and by what the motion would take.
@@ -186,12 +201,66 @@ TrackingResult DirectOdometry::align(const TrackingReference& reference, const M
   return better ? found : likely;
 }
 
+double DirectOdometry::flow_of(const SE3& T_current_reference,
+                               const TrackingReference& reference) const {
+  const PointMotion motion = motion_of_points(reference.levels[0], T_current_reference,
+                                              std::numeric_limits<double>::infinity());
+  return motion.flow_total / pixels_for_one_of_vga(camera_);
+}
+
 bool DirectOdometry::is_at_rest(const TrackingResult& tracked,
                                 const TrackingReference& reference) const {
-  if (!tracked.good) return false;
-  const PointMotion motion = motion_of_points(reference.levels[0], tracked.T_current_reference,
-                                              std::numeric_limits<double>::infinity());
-  return motion.flow_total < kAtRest * pixels_for_one_of_vga(camera_);
+  return tracked.good && flow_of(tracked.T_current_reference, reference) < kAtRest;
+}
+
+TrackingResult DirectOdometry::found_or_at_rest(const TrackingReference& reference,
+                                                const MonoFrame& frame, TrackingResult found) {
+  if (!config_.co_moving.enable || !found.good) return found;
+  const bool stood = std::exchange(past_.stands, past_.stands && is_at_rest(found, reference));
+  const SE3 last = stood && known_motion_ ? known_motion_->last : SE3();
+  const bool leaps = flow_of(found.T_current_reference * last.inverse(), reference) > kNearRest;
+  if (!stood && leaps) return found;
+  const ImageF& image = frame.pyramid->level(0);
+  const BrightnessTransfer transfer =
+      brightness_transfer(reference.affine, reference.exposure_s, found.affine, frame.exposure_s);
+  const auto share = [&](const SE3& T_current_reference) {
+    return agreeing_share(config_.co_moving, reference, image, T_current_reference, transfer);
+  };
+  const double enough = enough_stays(stood, leaps, share(found.T_current_reference));
+  const bool at_rest = share(SE3()) >= std::max(kLeastStays, enough);
+  const bool known = stood && past_.moving_keyframe == reference.keyframe_id;
+  if (at_rest ? !note_moving(reference, image, transfer) : !known) return found;
+  TrackingResult still = track_standing(reference, frame, found.affine, last);
+  if (!still.good || (!stood && !is_at_rest(still, reference))) return found;
+  const SE3& T_still = still.T_current_reference;
+  if (share(T_still) < enough) {
+    past_.stands |= stood && is_nearly(T_still, found.T_current_reference, reference.mean_rho);
+    return found;
+  }
+  past_.stands = true;
+  still.inlier_ratio = 1.0 - tracker_.fit(reference, image, T_still, transfer).misfits;
+  return still;
+}
+
+bool DirectOdometry::note_moving(const TrackingReference& reference, const ImageF& image,
+                                 const BrightnessTransfer& transfer) {
+  const ImageCells cells(config_.co_moving.cell, camera_.width, camera_.height);
+  ChosenCells moving = staying_cells(config_.co_moving, cells, reference, image, transfer);
+  if (stays_nearer(cells, reference, moving)) return false;
+  for (auto& cell : moving) cell = cell == 0 ? 1 : 0;
+  past_.moving = std::move(moving);
+  past_.moving_keyframe = reference.keyframe_id;
+  return true;
+}
+
+TrackingResult DirectOdometry::track_standing(const TrackingReference& reference,
+                                              const MonoFrame& frame, const Affine& affine,
+                                              const SE3& last) {
+  const ImageCells cells(config_.co_moving.cell, camera_.width, camera_.height);
+  TrackingResult out = tracker_.track(without(reference, cells, past_.moving), *frame.pyramid,
+                                      frame.exposure_s, affine, std::array{last}, {});
+  if (known_motion_ && !is_reachable(*known_motion_, out.T_current_reference)) out.good = false;
+  return out;
 }
 
 std::optional<TrackingResult> DirectOdometry::align_rest(const TrackingReference& reference,
@@ -260,7 +329,8 @@ MotionEvidence DirectOdometry::evidence_of(const TrackingReference& reference,
 TrackingResult DirectOdometry::align_whole_or_rest(const TrackingReference& reference,
                                                    const MonoFrame& frame,
                                                    std::shared_ptr<const FrameViews>* views) {
-  const TrackingResult found = whole_or_rest(reference, frame, align(reference, frame), views);
+  const TrackingResult near = found_or_at_rest(reference, frame, align(reference, frame));
+  const TrackingResult found = whole_or_rest(reference, frame, near, views);
   if (!place_unknown_ || !found.good || *views != nullptr) return found;
   const TrackingResult better = search_ahead(reference, frame, found);
   const bool same =

@@ -10,9 +10,32 @@ namespace sovo {
 
 namespace {
 
-constexpr int kFewestInCell = 2;  ///< Points.
+constexpr int kFewestInCell = 2;   ///< Points.
+constexpr std::size_t kAsked = 4;  ///< One of so many points.
 
 }  // namespace
+
+double agreeing_share(const CoMovingConfig& config, const TrackingReference& reference,
+                      const ImageF& image, const SE3& T_current_reference,
+                      const BrightnessTransfer& transfer) {
+  const ReferenceLevel& level = reference.levels[0];
+  const PointTransfer motion(level.camera, T_current_reference);
+  int agree = 0;
+  int textured = 0;
+  for (std::size_t i = 0; i < level.size(); i += kAsked) {
+    const Eigen::Vector3f at = motion(level, i);
+    if (!(at.z() > 0.0F)) continue;
+    const Eigen::Vector2f to = at.hnormalized();
+    if (!in_image(image, to.x(), to.y(), 2.0F)) continue;
+    const Sample seen = sample_with_gradient(image, to.x(), to.y());
+    const double gradient = std::hypot(seen.gx, seen.gy);
+    if (!(gradient > config.min_gradient)) continue;
+    const double expected = transfer.gain * static_cast<double>(level.colour[i]) + transfer.bias;
+    ++textured;
+    if (std::abs(seen.value - expected) < config.stays_below * gradient) ++agree;
+  }
+  return agree / std::max(1.0, static_cast<double>(textured));
+}
 
 MotionCheck::MotionCheck(const CoMovingConfig& config, int width, int height)
     : config_(config),

@@ -21,6 +21,13 @@ struct MotionEvidence {
   bool is_missing() const { return expected > 0.5 && moved < 0.25 * expected; }
 };
 
+/// Share of the points with texture that an image shows within `stays_below` pixels of where a
+/// motion takes them, by their residuals over its gradients there; every fourth point is asked.
+/// `transfer`: of brightness, reference to image.
+double agreeing_share(const CoMovingConfig& config, const TrackingReference& reference,
+                      const ImageF& image, const SE3& T_current_reference,
+                      const BrightnessTransfer& transfer);
+
 /// Tells a motion that is none of the world's. One between those of two things that an image shows
 /// in parts alike, the vehicle itself and what it moves past, fits both somewhat, and in haze a
 /// wrong one fits nearly everywhere: few residuals are large. But points agree no better than in

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "sovo/image/interpolation.h"
 #include "sovo/vo/lower_share.h"
@@ -12,9 +13,10 @@ namespace sovo {
 
 namespace {
 
-constexpr int kFewestPoints = 2;    ///< That make a cell one that stays.
-constexpr double kFarthest = 0.1;   ///< Of what stays, as many points may be farther
-constexpr double kOfTheRest = 0.5;  ///< than this share of the rest.
+constexpr int kFewestPoints = 2;     ///< That make a cell one that stays.
+constexpr double kFarthest = 0.1;    ///< Of what stays, as many points may be farther
+constexpr double kOfTheRest = 0.5;   ///< than this share of the rest.
+constexpr float kMuchNearer = 1.5F;  ///< Than the rest, by the medians of inverse depths.
 
 /// Gradient of an image at a pixel that is not at its edge [grey levels/px].
 double gradient_at(const ImageF& image, int x, int y) {
@@ -96,6 +98,17 @@ ChosenCells staying_cells(const CoMovingConfig& config, const ImageCells& cells,
     if (points[i] > 0 && stays(i) && cells.beside(i, sure)) chosen[i] = 1;
   }
   return chosen;
+}
+
+bool stays_nearer(const ImageCells& cells, const TrackingReference& reference,
+                  const ChosenCells& staying) {
+  const ReferenceLevel& level = reference.levels[0];
+  std::vector<float> stay, rest;  // inverse depths
+  for (std::size_t i = 0; i < level.size(); ++i) {
+    (staying[cells.at(level.u[i], level.v[i])] != 0 ? stay : rest).push_back(level.rho[i]);
+  }
+  return !stay.empty() && !rest.empty() &&
+         lower_share(std::move(stay), 0.5) > kMuchNearer * lower_share(std::move(rest), 0.5);
 }
 
 ChosenCells co_moving_cells(const CoMovingConfig& config, const ImageCells& cells,

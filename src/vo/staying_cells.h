@@ -17,6 +17,10 @@ ChosenCells staying_cells(const CoMovingConfig& config, const ImageCells& cells,
                           const TrackingReference& reference, const ImageF& image,
                           const BrightnessTransfer& transfer);
 
+/// Whether what stays is so much nearer than the rest that it may be the vehicle's own body.
+bool stays_nearer(const ImageCells& cells, const TrackingReference& reference,
+                  const ChosenCells& staying);
+
 /// Of the `staying` cells those whose points should have moved by the motion of the rest: they move
 /// along with the camera. None where they are not nearer than the rest, for then it is the rest
 /// that moves, before a world at rest.

@@ -47,6 +47,14 @@ def knocked(t):
             turned(yaw + 0.2 * math.sin(0.6 * t), pitch))
 
 
+def rest_then_hovering(t):
+    """From rest after two seconds, then within 5 cm and 3 degrees of there."""
+    share = eased(t, 2, 4)
+    at = [.05 * math.sin(.9 * t) + .02 * math.sin(2.3 * t), .04 * math.sin(.7 * t),
+          .03 * math.sin(1.1 * t)]
+    return [share * x for x in at], turned(share * .05 * math.sin(.5 * t))
+
+
 def rest_motion_rest(t):
     """From rest after half a second, to rest again after three."""
     return [1.5 * eased(t, 0.5, 3), 0.8 * eased(t, 0.5, 3), 0], turned(0)

@@ -4,8 +4,8 @@ import math
 import os
 
 import harness
-from flights import knocked, nothing_but_turning, rest_motion_rest, restless
-from flights import turn_on_the_spot, write_trajectory
+from flights import knocked, nothing_but_turning, rest_motion_rest, rest_then_hovering
+from flights import restless, turn_on_the_spot, write_trajectory
 from harness import FAILED, OK, largest_error, read_tum, sovo
 from sim_test import SimTest
 
@@ -112,6 +112,14 @@ class Robustness(SimTest):
         truth, live = self.fly("pool", "--frames", 80, *sun)
         self.expect_whole(truth, live, 0.05)
         self.assertNotIn("turned", self.log)
+
+    def test_the_waters_surface_does_not_drag_a_vehicle_at_rest_along(self):
+        # It drifts as a whole, and without caustics it is the strongest texture in view. What stood
+        # is followed on when the vehicle begins to move.
+        for world in (1, 2):
+            truth, live = self.fly("pool", "--set", "sim.caustics=0", "--set",
+                                   f"sim.seed={world}", *self.trajectory(rest_then_hovering, 8))
+            self.expect_whole(truth, live, 0.03)
 
     def test_the_light_changes_at_once(self):
         truth, live = self.fly("hall", "--frames", 110, light_factor=0.35, light_from_s=1.5,

@@ -148,5 +148,18 @@ TEST_F(MotionCheckTest, NorDoesWhatIsOutOfViewOrBehind) {
   EXPECT_EQ(check_.of(none, first_, SE3(), {}).expected, 0.0);
 }
 
+TEST_F(MotionCheckTest, AsMuchAgreesAsIsWhereTheMotionTakesIt) {
+  const auto share = [this](const ImageF& image, double px) {
+    return agreeing_share(CoMovingConfig(), points_of(first_), image, aside(px), {});
+  };
+  EXPECT_GT(share(moved_image(4.0), 4.0), 0.95);
+  EXPECT_LT(share(moved_image(4.0), 0.0), 0.3);
+  EXPECT_LT(share(moved_image(4.0), 2.0), 0.3) << "between both";
+  // The lower half stays.
+  EXPECT_NEAR(share(moved_image(4.0, 64), 0.0), 0.5, 0.15);
+  EXPECT_NEAR(share(moved_image(4.0, 64), 4.0), 0.5, 0.15);
+  EXPECT_LT(share(moved_image(4.0, 64), 2.0), 0.3);
+}
+
 }  // namespace
 }  // namespace sovo

@@ -76,6 +76,20 @@ TEST(StayingCellsTest, PointsBeyondTheImageTellNothing) {
   EXPECT_EQ(staying_cells({}, kCells, reference, steep(4.0), {}), before);
 }
 
+TEST(StayingCellsTest, WhatIsMuchNearerMayBeTheVehicleItself) {
+  ChosenCells lower(kCells.size(), 0);
+  std::fill(lower.begin() + 8, lower.end(), std::uint8_t{1});
+  const auto nearer = [&](float lower_rho) {
+    return stays_nearer(kCells, grid(steep(0.0), 0.5F, lower_rho), lower);
+  };
+  EXPECT_TRUE(nearer(2.0F));
+  EXPECT_FALSE(nearer(0.6F)) << "a floor, and what moves above it";
+  EXPECT_FALSE(nearer(0.1F)) << "something passes in front of the world";
+  const TrackingReference near = grid(steep(0.0), 2.0F, 2.0F);
+  EXPECT_FALSE(stays_nearer(kCells, near, ChosenCells(kCells.size(), 1)));
+  EXPECT_FALSE(stays_nearer(kCells, near, ChosenCells(kCells.size(), 0)));
+}
+
 class CoMovingOfStaying : public ::testing::Test {
  protected:
   CoMovingOfStaying() : lower_(kCells.size(), 0) {

@@ -25,9 +25,10 @@ constexpr double kLess = 0.5;       ///< when misfits come down to this share.
 // When the camera may be at rest, and something else moves.
 constexpr double kNearRest = 6.0;    ///< RMS flow of a pose that may be wrong by that [px of VGA].
 constexpr double kLeastStays = 0.3;  ///< Share of points that are where they were, and that over
-constexpr double kMoreStays = 1.25;  ///< the share where the pose takes them; less once it stands,
-constexpr double kLeastBeforeLeap = 0.2;  ///< and from there a leap has to explain
-constexpr double kMoreBeforeLeap = 0.6;   ///< so much that what stood is this share of it.
+constexpr double kMoreStays = 1.15;  ///< the share of those that are where the pose takes them,
+constexpr double kMoreStood = 0.8;   ///< the latter once it stood.
+constexpr double kLeastBeforeLeap = 0.2;  ///< The same two where the pose leaps from there.
+constexpr double kMoreBeforeLeap = 0.6;
 // When much agrees better in its place than where the motion takes it.
 constexpr double kFitsBetter = 0.75;  ///< Share of the rest that agrees with another motion,
 constexpr double kLessEnergy = 0.6;   ///< which brings its energy down to this share.
@@ -74,7 +75,7 @@ bool is_nearly(const SE3& a, const SE3& b, double mean_rho) {
 /// where it `stood`, by the share that is where a pose takes them; `leaps`: far from the last one.
 double enough_stays(bool stood, bool leaps, double moved) {
   if (!stood) return std::max(kLeastStays, kMoreStays * moved);
-  if (!leaps) return std::max(kLeastStays, moved / kMoreStays);
+  if (!leaps) return std::max(kLeastStays, kMoreStood * moved);
   return std::max(kLeastBeforeLeap, kMoreBeforeLeap * moved);
 }
 

@@ -300,11 +300,11 @@ Result<void> check_config(const AppConfig& config) {
     return Error{"max_halvings must be 0 to 4"};
   }
   const RightTurnConfig& turn = config.odometry.right_turn;
-  if (!(turn.min_px >= 0.0 && turn.gate_sigmas > 0.0 && turn.expected_px > 0.0 &&
-        turn.memory >= 1)) {
+  if (!(turn.min_px >= 0.0 && turn.clear_px >= 0.0 && turn.gate_sigmas > 0.0 &&
+        turn.expected_px > 0.0 && turn.memory >= 1)) {
     return Error{
-        "right_turn: min_px must not be negative, gate_sigmas and expected_px must be positive, "
-        "memory at least 1"};
+        "right_turn: min_px and clear_px must not be negative, gate_sigmas and expected_px must be "
+        "positive, memory at least 1"};
   }
   if (!(std::abs(config.odometry.readout_ms) <= 1000.0)) {
     return Error{"readout_ms must be in [-1000, 1000]; negative: rows are read from below"};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 namespace sovo {
@@ -17,6 +18,13 @@ constexpr double kInDoubt = 2.5;         ///< Likewise: where a scale is not tak
 constexpr int kKnocked = 6;              ///< Keyframes in a row that are far from the mean.
 /// How many times a turn must exceed what parts of the images disagree about it.
 constexpr double kDisagreements = 12.0;
+/// Of lenses that are described well keyframes scatter little: by this [px] before they have shown
+/// by how much, and what few of them agree about counts less where they scatter by more.
+constexpr double kClearPx = 0.04;
+constexpr double kClearSigmas = 3.0;
+constexpr double kFewestClear = 6.0;  ///< Keyframes; fewer may scatter little by chance.
+/// How many times a turn must exceed what parts of the images disagree about all three axes.
+constexpr double kClearDisagreements = 8.0;
 constexpr double kStays = 0.85;      ///< Of their distance, which the newest has at least.
 constexpr double kLeast = 0.25;      ///< Of the threshold, once it was exceeded.
 constexpr double kSurePx = 0.25;     ///< What lenses look like at most, where they always do.
@@ -75,7 +83,8 @@ bool RightTurn::in_doubt() const {
 
 void RightTurn::note(const KeyframeTurn& seen, Axis* axis) const {
   const double px = seen.px;
-  const double away = std::abs(px - axis->turns.mean) / (config_.gate_sigmas * spread(axis->turns));
+  const double away = std::abs(px - axis->turns.mean) /
+                      (config_.gate_sigmas * spread(axis->turns, config_.expected_px));
   const bool known = axis->turns.count >= kFewest && std::abs(px - axis->turns.mean) > kSurePx;
   axis->in_doubt = known && away > kInDoubt;
   if (!known || away < kFar) {
@@ -110,19 +119,33 @@ Vec3 RightTurn::mean_px() const {
 }
 
 /// Of a keyframe's turn about the mean: what is expected, and what was seen.
-double RightTurn::spread(const Turns& turns) const {
-  const double expected = config_.expected_px * config_.expected_px;
-  return std::sqrt((kExpectedWeight * expected + turns.count * turns.variance) /
+double RightTurn::spread(const Turns& turns, double expected_px) {
+  return std::sqrt((kExpectedWeight * expected_px * expected_px + turns.count * turns.variance) /
                    (kExpectedWeight + turns.count));
 }
 
 /// Few keyframes know little of how they scatter. Where static depths hold the map, keyframes show
 /// more or less of a turn, but hardly any of many shows as little as `kSurePx`.
 double RightTurn::threshold(const Turns& turns) const {
-  const double scatter = (1.0 + 2.0 / turns.count) * spread(turns);
+  const double scatter = (1.0 + 2.0 / turns.count) * spread(turns, config_.expected_px);
   const double gate = std::max(config_.min_px, config_.gate_sigmas * scatter);
   const double bound = turns.count < kMany ? gate : std::min(gate, kSurePx + kSureSigmas * scatter);
-  return std::max(bound, kDisagreements * std::sqrt(turns.disagreement));
+  const double any_lens = std::max(bound, kDisagreements * std::sqrt(turns.disagreement));
+  return std::min(any_lens, clear_threshold(turns));
+}
+
+/// Of lenses that are described well. One that is not shows it about some axis, most often as a
+/// roll, when it looks like a turn about another.
+double RightTurn::clear_threshold(const Turns& turns) const {
+  double disagreement = 0.0;
+  for (const Axis& axis : axes_) {
+    if (axis.turns.count < kFewestClear) return std::numeric_limits<double>::infinity();
+    disagreement += axis.turns.disagreement;
+  }
+  const double scatter = (1.0 + 2.0 / turns.count) * spread(turns, kClearPx);
+  const double usual = kClearPx * std::sqrt(turns.count / kFewestClear);
+  const double gate = kClearSigmas * scatter * std::max(1.0, scatter / usual);
+  return std::max({config_.clear_px, gate, kClearDisagreements * std::sqrt(disagreement)});
 }
 
 }  // namespace sovo

@@ -9,6 +9,7 @@ namespace sovo {
 struct RightTurnConfig {
   bool undo = true;
   double min_px = 0.15;
+  double clear_px = 0.05;
   double gate_sigmas = 4.0;
   double expected_px = 0.15;
   int memory = 60;
@@ -17,6 +18,7 @@ struct RightTurnConfig {
   void visit(Visitor& v) {
     v("undo", undo, "a turn of the right camera against its calibration is found and undone");
     v("min_px", min_px, "least turn that is undone [px at the centre of the right image]");
+    v("clear_px", clear_px, "likewise, where all parts of the images agree about it [px]");
     v("gate_sigmas", gate_sigmas, "and by how much it must exceed the keyframes' scatter");
     v("expected_px", expected_px, "that scatter, before keyframes have shown it [px]");
     v("memory", memory, "keyframes over which turns are averaged");
@@ -31,8 +33,9 @@ struct RightTurnConfig {
 /// Lenses that are described badly look like small turns, which differ from place to place in the
 /// image and hence from keyframe to keyframe, and so does a map whose depths are wrong, after a
 /// narrow turn of the vehicle for one. What exceeds the scatter of keyframes by far, and what parts
-/// of their images disagree about it, is a turn of the camera. What a few keyframes see elsewhere
-/// is left out; where many in a row do it was knocked.
+/// of their images disagree about it, is a turn of the camera. Where parts of the images disagree
+/// about none of the three axes the lenses are described well, and small turns are believed, too.
+/// What a few keyframes see elsewhere is left out; where many in a row do it was knocked.
 class RightTurn {
  public:
   /// `focal`: of the right camera [px].
@@ -77,8 +80,9 @@ class RightTurn {
   void note(const KeyframeTurn& seen, Axis* axis) const;
   bool exceeds(double part) const;
   Vec3 certain_px() const;
-  double spread(const Turns& turns) const;
+  static double spread(const Turns& turns, double expected_px);
   double threshold(const Turns& turns) const;
+  double clear_threshold(const Turns& turns) const;
 
   RightTurnConfig config_;
   double focal_;

@@ -164,6 +164,17 @@ class Robustness(SimTest):
         self.assertEqual(told, 0)
         self.assertGreater(later, 0.1)
 
+    def test_a_right_camera_that_is_turned_by_a_third_of_a_pixel(self):
+        # Which makes ways 1 to 3 % too long.
+        def later_half(*options):
+            truth, live = self.fly("lawn", "--frames", 120, *options, calibration=(),
+                                   right_yaw_deg=0.045)
+            self.assertEqual(len(live), len(truth))
+            return largest_error(live[60:], truth, live[60][0])
+
+        self.assertLess(later_half(), 0.01)
+        self.assertGreater(later_half("--set", "right_turn.undo=false"), 0.02)
+
     def test_rows_are_exposed_one_after_the_other(self):
         # Taken as of one instant 40 to 70 mm off; the race is knocked after two seconds.
         rolling = ("--set", "readout_ms=16")

@@ -30,6 +30,14 @@ ImageF moved_image(double shift, int fixed_from = kViewSide) {
   return image;
 }
 
+/// The same image without texture in its lower half.
+ImageF flat_below(ImageF image) {
+  for (int y = kViewSide / 2; y < kViewSide; ++y) {
+    for (int x = 0; x < kViewSide; ++x) image.at(x, y) = 100.0F;
+  }
+  return image;
+}
+
 void add_noise(double sigma, unsigned seed, ImageF* image) {
   std::mt19937 random(seed);
   std::normal_distribution<float> noise(0.0F, static_cast<float>(sigma));
@@ -159,6 +167,11 @@ TEST_F(MotionCheckTest, AsMuchAgreesAsIsWhereTheMotionTakesIt) {
   EXPECT_NEAR(share(moved_image(4.0, 64), 0.0), 0.5, 0.15);
   EXPECT_NEAR(share(moved_image(4.0, 64), 4.0), 0.5, 0.15);
   EXPECT_LT(share(moved_image(4.0, 64), 2.0), 0.3);
+  // What has no texture agrees with any motion, and does not count.
+  const ImageF moved = flat_below(moved_image(4.0));
+  const TrackingReference points = points_of(flat_below(first_));
+  EXPECT_GT(agreeing_share(CoMovingConfig(), points, moved, aside(4.0), {}), 0.95);
+  EXPECT_LT(agreeing_share(CoMovingConfig(), points, moved, SE3(), {}), 0.3);
 }
 
 }  // namespace

@@ -49,14 +49,14 @@ void write_absolute(std::ostream& out, const EvaluationReport& r) {
   };
   const double scale = r.similarity.S_truth_estimate.scale();
   row("SE(3) [m]", r.rigid.translation, "1");
-  row("yaw, z up [m]", r.yaw.translation, "1");
+  row("yaw* [m]", r.yaw.translation, "1");
   row("Sim(3) [m]", r.similarity.translation, format_fixed(scale, 5));
   Statistics degrees = r.rotation;
   for (double* v : {&degrees.rmse, &degrees.mean, &degrees.median, &degrees.p95, &degrees.max}) {
     *v *= kDegrees;
   }
   row("rotation [deg]", degrees, "");
-  out << "\n";
+  out << "  * for estimates whose z axis is vertical; sovo's have the axes of the first camera\n\n";
 }
 
 void write_scale(std::ostream& out, const EvaluationReport& r) {

@@ -106,7 +106,10 @@ TEST(Evaluation, ReportsCarryTheNumbers) {
   const auto json = nlohmann::json::parse(format_json(*report));
   EXPECT_EQ(json["poses"]["compared"], 200);
   EXPECT_DOUBLE_EQ(json["ate_se3_m"]["rmse"].get<double>(), report->rigid.translation.rmse);
-  EXPECT_NE(format_table(*report).find("SE(3) [m]"), std::string::npos);
+  const std::string table = format_table(*report);
+  EXPECT_NE(table.find("SE(3) [m]"), std::string::npos);
+  EXPECT_NE(table.find("yaw* [m]"), std::string::npos);
+  EXPECT_NE(table.find("  * for estimates whose z axis is vertical"), std::string::npos);
   const std::string svg = format_svg(*report, "a < b & c");
   EXPECT_NE(svg.find("a &lt; b &amp; c"), std::string::npos);
   EXPECT_NE(svg.find("Trajectory"), std::string::npos);

@@ -63,7 +63,7 @@ FramePreparation::FramePreparation(const StereoOdometryConfig& config, const Ste
       max_levels_(config.vo.tracker.max_levels),
       local_contrast_(config.local_contrast),
       readout_s_(1e-3 * config.readout_ms) {
-  if (config.lighting == Lighting::kVehicle) left_contrast_.emplace(local_contrast_);
+  take_light_out(config.lighting == Lighting::kVehicle);
   const CameraModel raw_left = cameras.rig.left.downscaled(downscale_);
   StereoRig rig = cameras.rig;
   rig.left = optimal_pinhole(raw_left, config.undistortion);
@@ -79,9 +79,12 @@ FramePreparation::FramePreparation(const StereoOdometryConfig& config, const Ste
     right_unroller_.emplace(rig.right, rig.right);
   }
   add_resolutions(rig, mask, config.max_halvings);
-  if (config.backend == Backend::kDirect && config.lighting == Lighting::kWorld &&
-      config.vo.vignette.estimate && cameras.left_photometric.vignette.empty() &&
-      cameras.right_photometric.vignette.empty()) {
+  const bool direct = config.backend == Backend::kDirect;
+  if (direct && config.lighting == Lighting::kAuto && config.mode != OdometryMode::kMono) {
+    moving_light_ = std::make_unique<MovingLight>(config.moving_light);
+  }
+  if (direct && config.lighting != Lighting::kVehicle && config.vo.vignette.estimate &&
+      cameras.left_photometric.vignette.empty() && cameras.right_photometric.vignette.empty()) {
     vignette_estimate_ = std::make_unique<VignetteEstimate>(rig.left);
     const OffAxis off_axis(rig.left);
     left_vignette_.emplace(off_axis.of(rig.left));
@@ -180,8 +183,19 @@ void FramePreparation::write_left(const SideImage& left, const Vec3& turn, Image
   }
 }
 
+LightObservers FramePreparation::light_observers() const {
+  if (left_contrast_) return {};
+  return {vignette_estimate_.get(), moving_light_.get()};
+}
+
+void FramePreparation::take_light_out(bool out) {
+  left_contrast_.reset();
+  if (out) left_contrast_.emplace(local_contrast_);
+}
+
 double FramePreparation::corner_light() const {
-  return vignette_estimate_ ? std::exp(vignette_estimate_->current().log_at(1.0)) : 1.0;
+  return vignette_estimate_ && !left_contrast_ ? std::exp(vignette_estimate_->current().log_at(1.0))
+                                               : 1.0;
 }
 
 MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver* observer,
@@ -190,7 +204,7 @@ MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver
   out.rate = rate;
   out.rows = row_shift(rate, halvings);
   out.stamp_ns = frame.stamp_ns;
-  if (vignette_estimate_) out.vignette = vignette_estimate_->current();
+  if (vignette_estimate_ && !left_contrast_) out.vignette = vignette_estimate_->current();
   // Without its light an image does not depend on its exposure.
   if (!left_contrast_) out.exposure_s = frame.left.exposure_s;
   auto pyramid = left_pyramids_.take();

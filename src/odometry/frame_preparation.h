@@ -13,7 +13,9 @@
 #include "sovo/image/unroller.h"
 #include "sovo/image/vignette.h"
 #include "sovo/odometry/stereo_odometry.h"
+#include "sovo/vo/light_observers.h"
 #include "sovo/vo/monocular_backend.h"
+#include "sovo/vo/moving_light.h"
 #include "sovo/vo/vignette_estimate.h"
 
 namespace sovo {
@@ -52,8 +54,15 @@ class FramePreparation {
   void prepare_right(const SideImage& right, int halvings, const MonoFrame& left,
                      ImagePyramid* out) const;
 
-  /// Null where the vignette is known, or does not matter.
-  VignetteEstimate* vignette_estimate() const { return vignette_estimate_.get(); }
+  /// For maps of images as they are prepared from now on.
+  LightObservers light_observers() const;
+
+  /// Whether the lamps were found to move along, and images still have their light.
+  bool wants_light_out() const {
+    return !left_contrast_ && moving_light_ && moving_light_->found();
+  }
+  /// Whether images are freed of their light from now on. Precondition: no thread prepares any.
+  void take_light_out(bool out);
 
   /// OdometryOutput::corner_light.
   double corner_light() const;
@@ -83,7 +92,7 @@ class FramePreparation {
   int max_levels_;
   std::vector<Resolution> resolutions_;  ///< By the number of halvings.
   LocalContrastConfig local_contrast_;
-  std::optional<LocalContrast> left_contrast_;  ///< With lighting: vehicle.
+  std::optional<LocalContrast> left_contrast_;  ///< Where images are freed of their light.
   std::optional<Undistorter> undistorter_;
   double readout_s_;
   std::optional<Unroller> left_unroller_, right_unroller_;  ///< With a rolling shutter.
@@ -91,6 +100,7 @@ class FramePreparation {
   ImageF raw_left_;
   ImageF unhalved_left_;
   PyramidPool left_pyramids_;
+  std::unique_ptr<MovingLight> moving_light_;  ///< With lighting: auto.
   std::unique_ptr<VignetteEstimate> vignette_estimate_;
   std::optional<VignetteCorrection> left_vignette_, right_vignette_;  ///< With an estimate.
 };

@@ -76,7 +76,7 @@ MapSegment::MapSegment(const StereoOdometryConfig& config, const FramePreparatio
       pool_(pool),
       observer_(observer),
       vo_(new_backend(config, rig().left, preparation.left_mask(halvings), halvings, pool,
-                      preparation.vignette_estimate())),
+                      preparation.light_observers())),
       right_(config.matcher, rig(), right_turn),
       readout_motion_(preparation),
       optimizer_(config.scale, rig()),

@@ -21,13 +21,13 @@ DirectConfig for_halved(DirectConfig config, int halvings) {
 std::unique_ptr<MonocularBackend> new_backend(const StereoOdometryConfig& config,
                                               const CameraModel& camera, const ImageU8& mask,
                                               int halvings, WorkerPool* pool,
-                                              VignetteEstimate* vignette) {
+                                              const LightObservers& light) {
   if (config.backend == Backend::kFeatures) {
     return std::make_unique<FeatureOdometry>(config.features, config.vo.keyframe, camera, mask,
                                              pool);
   }
   return std::make_unique<DirectOdometry>(for_halved(config.vo, halvings), camera, mask,
-                                          config.seed, pool, vignette);
+                                          config.seed, pool, light);
 }
 
 }  // namespace sovo

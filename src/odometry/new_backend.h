@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "sovo/odometry/stereo_odometry.h"
+#include "sovo/vo/light_observers.h"
 #include "sovo/vo/monocular_backend.h"
-#include "sovo/vo/vignette_estimate.h"
 #include "sovo/vo/worker_pool.h"
 
 namespace sovo {
@@ -14,6 +14,6 @@ namespace sovo {
 std::unique_ptr<MonocularBackend> new_backend(const StereoOdometryConfig& config,
                                               const CameraModel& camera, const ImageU8& mask,
                                               int halvings, WorkerPool* pool,
-                                              VignetteEstimate* vignette);
+                                              const LightObservers& light);
 
 }  // namespace sovo

@@ -11,6 +11,7 @@
 #include "sovo/odometry/dead_reckoning.h"
 #include "sovo/odometry/exposure_motion.h"
 #include "sovo/odometry/frame_check.h"
+#include "sovo/odometry/frame_velocity.h"
 #include "sovo/odometry/frame_verdict.h"
 #include "sovo/odometry/live_threads.h"
 #include "sovo/odometry/map_segment.h"
@@ -283,7 +284,18 @@ class StereoOdometry::Impl {
              carried(tracked.reference->covariance, tracked.T_world_camera.translation()), out);
     map(std::move(tracked), right);
     judge(t, right_problem, out);
+    if (out->is_keyframe && preparation_.wants_light_out()) take_light_out(frame, right, out);
     if (found_again && out->reason.empty()) out->reason = "found by what the last keyframes saw";
+  }
+
+  /// The lamps move along: a map of images that are freed of their light takes over, if one can
+  /// begin with this frame.
+  void take_light_out(const StereoFrame& frame, const SideImage* right, OdometryOutput* out) {
+    if (threads_) threads_->drain();
+    preparation_.take_light_out(true);
+    const bool begun = begin_next_segment(frame, right, out->T_odom_left, false);
+    preparation_.take_light_out(begun);
+    if (begun) out->reason = "lamps that move along light the scene; a new segment begins";
   }
 
   /// T_odom_left by what the last keyframes saw.
@@ -306,7 +318,10 @@ class StereoOdometry::Impl {
     out->reason = FrameCheck::with_exposure(why_lost(tracking), frame);
     const bool over = failures_ >= config_.lost_frames || map_broke_down();
     const SE3 T_odom_left = recognized.value_or(reckoning_.at(frame.stamp_ns));
-    if ((over || is_left_behind(frame)) && begin_next_segment(frame, right, T_odom_left, over)) {
+    const bool is_gone = over || is_left_behind(frame);
+    constexpr int kYoung = 10;
+    if (is_gone && followed_ < kYoung && segment_->is_noisy()) noise_broke_ = true;
+    if (is_gone && begin_next_segment(frame, right, T_odom_left, over)) {
       out->reason += "; a new segment begins";
     }
   }
@@ -327,9 +342,7 @@ class StereoOdometry::Impl {
   /// later one.
   bool begin_next_segment(const StereoFrame& frame, const SideImage* right, const SE3& T_odom_left,
                           bool over) {
-    constexpr int kYoung = 10;
     if (threads_) threads_->drain();
-    noise_broke_ = noise_broke_ || (followed_ < kYoung && segment_->is_noisy());
     auto next = new_segment(next_segment_, 0);
     Start start{nullptr, preparation_.prepare_left(frame, observer_)};
     bool begun = next->initialize(start.left, right, T_odom_left);
@@ -421,21 +434,8 @@ class StereoOdometry::Impl {
         scale.position_covariance(T_odom_left.translation());
     if (!scale.locked) reckoning_.forget_motion();
     reckoning_.note(out->stamp_ns, T_odom_left, published_.has_value() && scale.locked);
-    if (published_) set_velocity(scale.sigma, out);
-    published_ = Published{out->stamp_ns, T_odom_left, frame};
-  }
-
-  /// From the frame before to this one; both alignments err, and the scale does.
-  void set_velocity(double log_scale_sigma, OdometryOutput* out) {
-    const double dt = kNanosecond * static_cast<double>(out->stamp_ns - published_->stamp_ns);
-    const SE3 step = published_->T_odom_left.inverse() * out->T_odom_left;
-    out->velocity = step.log() / dt;
-    const SO3 R_left_odom = out->T_odom_left.rotation().inverse();
-    out->velocity_covariance =
-        rotated(R_left_odom, published_->frame_covariance + out->frame_covariance) / (dt * dt);
-    const Vec3 error = log_scale_sigma * out->velocity.head<3>();
-    out->velocity_covariance.topLeftCorner<3, 3>() += error * error.transpose();
-    distance_ += step.translation().norm();
+    if (published_) distance_ += set_velocity(*published_, scale.sigma, out);
+    published_ = PublishedPose{out->stamp_ns, T_odom_left, frame};
   }
 
   void judge(const FrameTracking& tracking, const std::string& right_problem, OdometryOutput* out) {
@@ -455,12 +455,7 @@ class StereoOdometry::Impl {
   std::optional<StereoFrame> first_frame_;  ///< Of a rolling shutter, until there is a second one.
   int unsteady_ = 0;                        ///< Frames in a row that would have been keyframes.
   TrajectoryRecorder recorder_;
-  struct Published {
-    std::int64_t stamp_ns = 0;
-    SE3 T_odom_left;
-    Mat6 frame_covariance = Mat6::Zero();
-  };
-  std::optional<Published> published_;
+  std::optional<PublishedPose> published_;
   DeadReckoning reckoning_;
   double distance_ = 0.0;
   int failures_ = 0;          ///< Frames in a row without a pose.

@@ -17,6 +17,7 @@
 #include "sovo/scale/scale_optimizer.h"
 #include "sovo/vo/direct_config.h"
 #include "sovo/vo/features/feature_config.h"
+#include "sovo/vo/moving_light.h"
 
 namespace sovo {
 
@@ -49,6 +50,7 @@ enum class DepthInit {
 
 /// What lights the scene.
 enum class Lighting {
+  kAuto,     ///< The world, until lamps are found to move along (MovingLight).
   kWorld,    ///< Lamps that stand still, or the sun.
   kVehicle,  ///< Lamps that move with the cameras: LocalContrast takes their light out.
 };
@@ -73,8 +75,9 @@ constexpr std::array<std::pair<DepthInit, const char*>, 3> enum_names(DepthInit)
            {DepthInit::kAuto, "auto"}}};
 }
 
-constexpr std::array<std::pair<Lighting, const char*>, 2> enum_names(Lighting) {
-  return {{{Lighting::kWorld, "world"}, {Lighting::kVehicle, "vehicle"}}};
+constexpr std::array<std::pair<Lighting, const char*>, 3> enum_names(Lighting) {
+  return {
+      {{Lighting::kAuto, "auto"}, {Lighting::kWorld, "world"}, {Lighting::kVehicle, "vehicle"}}};
 }
 
 struct StereoOdometryConfig {
@@ -84,7 +87,8 @@ struct StereoOdometryConfig {
   double init_min_matched = 0.3;  ///< Share of good static matches that `auto` asks for.
   DepthInit depth_init = DepthInit::kStereo;
   StereoAssistConfig assist;
-  Lighting lighting = Lighting::kWorld;
+  Lighting lighting = Lighting::kAuto;
+  MovingLightConfig moving_light;
   LocalContrastConfig local_contrast;
   int downscale = 1;           ///< Whole number by which input images are reduced.
   int max_halvings = 2;        ///< Images in which no map can begin are halved so often at most.
@@ -117,8 +121,13 @@ struct StereoOdometryConfig {
       "share of good static matches that init: auto asks for");
     v("depth_init", depth_init, "where a new point's first depth interval comes from");
     v("assist", assist, "depth_init: auto, when stereo matching helps");
-    v("lighting", lighting, "what lights the scene: vehicle for lamps that move with the cameras");
-    v("local_contrast", local_contrast, "lighting: vehicle, how images are freed of their light");
+    v("lighting", lighting,
+      "what lights the scene: world for the sun, vehicle for lamps that move with the cameras, "
+      "auto "
+      "to find out");
+    v("moving_light", moving_light, "lighting: auto, when lamps are believed to move along");
+    v("local_contrast", local_contrast,
+      "where lamps move along, how images are freed of their light");
     v("downscale", downscale, "whole number by which input images are reduced");
     v("max_halvings", max_halvings,
       "images that are too blurred, noisy or pale for a map to begin are halved so often at most");

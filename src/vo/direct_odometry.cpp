@@ -9,10 +9,13 @@
 #include "sovo/vo/keyframe_policy.h"
 #include "sovo/vo/keyframe_slopes.h"
 #include "sovo/vo/marginalization.h"
+#include "sovo/vo/moving_light.h"
+#include "sovo/vo/point_sights.h"
 #include "sovo/vo/stage_timer.h"
 #include "sovo/vo/static_residual.h"
 #include "sovo/vo/staying_cells.h"
 #include "sovo/vo/view_forecast.h"
+#include "sovo/vo/vignette_estimate.h"
 
 namespace sovo {
 
@@ -77,7 +80,7 @@ Point start_point(const ImmaturePoint& immature, const DepthProposal& depth) {
 
 DirectOdometry::DirectOdometry(const DirectConfig& config, const CameraModel& camera,
                                const ImageU8& mask, int seed, WorkerPool* pool,
-                               VignetteEstimate* vignette)
+                               const LightObservers& light)
     : config_(config),
       camera_(camera),
       mask_(mask),
@@ -88,7 +91,7 @@ DirectOdometry::DirectOdometry(const DirectConfig& config, const CameraModel& ca
       co_moving_(config.co_moving, camera.width, camera.height),
       motion_check_(config.co_moving, camera.width, camera.height),
       exposure_(config.motion_blur),
-      vignette_(vignette),
+      light_(light),
       selector_(selector_config(config.selection, seed)),
       activator_(config.points, config.window, pool),
       adjuster_(config.window, pool),
@@ -247,6 +250,13 @@ void DirectOdometry::leave_out_co_moving() {
   erase_marked_points(&window_);
 }
 
+void DirectOdometry::observe_light() {
+  if (light_.vignette == nullptr && light_.moving == nullptr) return;
+  const PointSights seen = sights_in_newest(window_);
+  if (light_.vignette != nullptr) light_.vignette->observe(window_, seen);
+  if (light_.moving != nullptr) light_.moving->observe(camera_, seen);
+}
+
 MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& T_world_camera,
                                         const KeyframeStereo& stereo, const MapTimer& timer) {
   MapResult result;
@@ -268,8 +278,7 @@ MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& 
       !result.bundle.finite || result.bundle.rmse > kMaxBundleRmse || result.bundle.residuals < 100;
   if (result.failed) return result;
 
-  const bool doubtful = tracked.tracking.motion_denied || tracked.tracking.rest_denied;
-  if (vignette_ != nullptr && !doubtful) vignette_->observe(window_);
+  if (!tracked.tracking.motion_denied && !tracked.tracking.rest_denied) observe_light();
   history_.extend_covariance(k.T_world_camera(), result.bundle.newest_covariance);
   gradient_scatter_ = result.bundle.gradient_scatter;
   for (int h = 0; h < window_.size(); ++h) {

@@ -14,13 +14,13 @@
 #include "sovo/vo/direct_config.h"
 #include "sovo/vo/exposure_estimate.h"
 #include "sovo/vo/keyframe_policy.h"
+#include "sovo/vo/light_observers.h"
 #include "sovo/vo/map_history.h"
 #include "sovo/vo/monocular_backend.h"
 #include "sovo/vo/motion_check.h"
 #include "sovo/vo/motion_model.h"
 #include "sovo/vo/pixel_selector.h"
 #include "sovo/vo/point_activation.h"
-#include "sovo/vo/vignette_estimate.h"
 #include "sovo/vo/window.h"
 #include "sovo/vo/worker_pool.h"
 
@@ -31,9 +31,9 @@ namespace sovo {
 class DirectOdometry final : public MonocularBackend {
  public:
   /// `camera`: pinhole without distortion. `mask`: 0 where pixels must not be used (may be empty).
-  /// `vignette` is told what keyframes show of it; may be null.
+  /// `light` is told what keyframes show of it.
   DirectOdometry(const DirectConfig& config, const CameraModel& camera, const ImageU8& mask,
-                 int seed, WorkerPool* pool, VignetteEstimate* vignette = nullptr);
+                 int seed, WorkerPool* pool, const LightObservers& light = {});
 
   void use_static_residuals(const StereoRig& rig) override { window_.set_rig(rig); }
   int wanted_points() const override { return config_.points.active_points; }
@@ -85,6 +85,8 @@ class DirectOdometry final : public MonocularBackend {
   void trace_all(const MonoFrame& frame, const SE3& T_world_camera, const Affine& affine);
   MapResult make_keyframe(const TrackedFrame& tracked, const SE3& T_world_camera,
                           const KeyframeStereo& stereo, const MapTimer& timer);
+  /// Tells what the newest keyframe shows of the light, after its bundle adjustment.
+  void observe_light();
   std::vector<SelectedPixel> select_lasting_pixels();
   std::vector<SelectedPixel> select_usable(const ImagePyramid& pyramid, int wanted);
   void find_co_moving(const TrackedFrame& tracked, const SE3& T_world_camera);
@@ -169,7 +171,7 @@ class DirectOdometry final : public MonocularBackend {
   CoMovingCells co_moving_;
   MotionCheck motion_check_;
   ExposureEstimate exposure_;
-  VignetteEstimate* vignette_;
+  LightObservers light_;
   PixelSelector selector_;
   double lasting_share_ = 1.0;  ///< Of the pixels selected last, in view of the next keyframe.
   PointActivator activator_;

@@ -5,9 +5,6 @@
 #include <cstddef>
 #include <optional>
 
-#include "sovo/vo/linearization.h"
-#include "sovo/vo/pattern.h"
-
 namespace sovo {
 
 namespace {
@@ -29,25 +26,6 @@ constexpr int kFewestInQuarter = 10;
 constexpr double kHuberSigmas = 1.345;  ///< Standard deviations.
 constexpr double kLeastSigma = 0.003;   ///< Of the logarithm of a mean of grey levels.
 
-double mean(const std::array<float, kPatternSize>& grey) {
-  double sum = 0.0;
-  for (const float g : grey) sum += static_cast<double>(g);
-  return sum / kPatternSize;
-}
-
-/// Mean grey level of a pattern where an image shows it, as large as it is there.
-double pattern_mean(const ImageF& image, const PatternProjection& seen) {
-  std::array<float, kPatternSize> grey{};
-  for (std::size_t i = 0; i < kPatternSize; ++i) {
-    const float* upper = image.data() + seen.offset[i];
-    const float* lower = upper + image.width();
-    const float above = upper[0] + seen.fx[i] * (upper[1] - upper[0]);
-    const float below = lower[0] + seen.fx[i] * (lower[1] - lower[0]);
-    grey[i] = above + seen.fy[i] * (below - above);
-  }
-  return mean(grey);
-}
-
 /// What one image shows of a point.
 struct View {
   Vec3 basis;
@@ -57,11 +35,11 @@ struct View {
 };
 
 std::optional<View> view_of(const OffAxis& off_axis, const CameraModel& camera,
-                            const Keyframe& keyframe, float u, float v, double grey) {
+                            const Keyframe& keyframe, double u, double v, double grey) {
   if (grey <= 0.0) return std::nullopt;
   View view;
-  const double x = static_cast<double>(u) - camera.cx;
-  const double y = static_cast<double>(v) - camera.cy;
+  const double x = u - camera.cx;
+  const double y = v - camera.cy;
   const double s = off_axis.of(x / camera.fx, y / camera.fy);
   view.basis = Vec3(RadialVignette::basis(s).data());
   view.x = x / camera.width;
@@ -144,20 +122,14 @@ RadialVignette VignetteEstimate::current() const {
   return current_;
 }
 
-std::vector<VignetteSight> VignetteEstimate::sights(const Window& window, int host) const {
-  const auto slot = static_cast<std::size_t>(window.newest().slot);
-  const int newest = window.size() - 1;
-  PatternProjection seen;
+std::vector<VignetteSight> VignetteEstimate::sights(const Window& window, int host,
+                                                    const std::vector<PointSight>& seen) const {
+  const CameraModel& camera = window.camera();
   std::vector<VignetteSight> sights;
-  sights.reserve(window[host].points.size());
-  for (const Point& p : window[host].points) {
-    const Residual& r = p.residuals[slot];
-    if (r.state != ResidualState::kIn) continue;
-    project_pattern(window, host, newest, p, &seen);
-    if (!seen.in_view) continue;
-    const auto from = view_of(off_axis_, window.camera(), window[host], p.u, p.v, mean(p.colour));
-    const auto to = view_of(off_axis_, window.camera(), window.newest(), seen.centre_u,
-                            seen.centre_v, pattern_mean(window.newest().image(), seen));
+  sights.reserve(seen.size());
+  for (const PointSight& s : seen) {
+    const auto from = view_of(off_axis_, camera, window[host], s.u_host, s.v_host, s.grey_host);
+    const auto to = view_of(off_axis_, camera, window.newest(), s.u, s.v, s.grey);
     if (!from || !to) continue;
     sights.push_back({to->basis - from->basis, to->log_grey - from->log_grey,
                       to->log_known - from->log_known, quarter_of(*to)});
@@ -165,10 +137,12 @@ std::vector<VignetteSight> VignetteEstimate::sights(const Window& window, int ho
   return sights;
 }
 
-void VignetteEstimate::observe(const Window& window) {
+void VignetteEstimate::observe(const Window& window, const PointSights& seen) {
   std::vector<std::vector<VignetteSight>> pairs;
-  pairs.reserve(static_cast<std::size_t>(window.size()));
-  for (int host = 0; host + 1 < window.size(); ++host) pairs.push_back(sights(window, host));
+  pairs.reserve(seen.size());
+  for (const auto& of_host : seen) {
+    pairs.push_back(sights(window, static_cast<int>(pairs.size()), of_host));
+  }
   observe(pairs);
 }
 

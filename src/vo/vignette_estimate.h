@@ -6,6 +6,7 @@
 
 #include "sovo/geometry/types.h"
 #include "sovo/image/vignette.h"
+#include "sovo/vo/point_sights.h"
 #include "sovo/vo/window.h"
 
 namespace sovo {
@@ -34,8 +35,8 @@ class VignetteEstimate {
   /// `camera`: the tracked one, of whole images.
   explicit VignetteEstimate(const CameraModel& camera) : off_axis_(camera) {}
 
-  /// Takes what is seen from the newest keyframe, after its bundle adjustment.
-  void observe(const Window& window);
+  /// Takes what is `seen` from the newest keyframe, after its bundle adjustment.
+  void observe(const Window& window, const PointSights& seen);
 
   /// Takes the sights of the pairs of one keyframe.
   void observe(const std::vector<std::vector<VignetteSight>>& pairs);
@@ -44,7 +45,8 @@ class VignetteEstimate {
   RadialVignette current() const;
 
  private:
-  std::vector<VignetteSight> sights(const Window& window, int host) const;
+  std::vector<VignetteSight> sights(const Window& window, int host,
+                                    const std::vector<PointSight>& seen) const;
   void add(const std::vector<VignetteSight>& pair);
   void step();
 

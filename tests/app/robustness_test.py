@@ -211,6 +211,14 @@ class Robustness(SimTest):
         truth, live = self.fly("hall", "--frames", 100, "--backend", "features", **gaps)
         self.expect_whole(truth, live, 0.06)
 
+    def test_lamps_of_the_vehicle_are_found_out(self):
+        # Without that 51 mm off, 3 with it; what is said of it comes with a new segment.
+        truth, live = self.fly("pool", "--frames", 120, "--reverse", "--set",
+                               "sim.lamps.count=2", calibration=())
+        self.assertIn("lamps that move along light the scene; a new segment begins", self.log)
+        self.assertEqual(len(live), len(truth))
+        self.assertLess(largest_error(live, truth, live[0][0]), 0.03)
+
     def test_lamps_of_the_vehicle_light_the_dark(self):
         # With lighting: world 0.09 m off, and lost.
         for light in (("--reverse",), ("--set", "sim.lamps.beam_deg=45")):

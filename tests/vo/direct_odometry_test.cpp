@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "sovo/vo/vignette_estimate.h"
 #include "vo/drive_test_support.h"
 
 namespace sovo {
@@ -107,7 +108,7 @@ MonoFrame darkened(MonoFrame frame) {
 TEST_F(Map, AVignetteIsTakenFromFramesWhoseMotionIsSure) {
   for (const bool doubtful : {false, true}) {
     VignetteEstimate vignette(small_camera());
-    DirectOdometry vo(small_config(), small_camera(), ImageU8(), 0, &pool_, &vignette);
+    DirectOdometry vo(small_config(), small_camera(), ImageU8(), 0, &pool_, {&vignette, nullptr});
     begin(darkened(first_), &vo);
     int keyframes = 0;
     for (int i = 1; i <= 20; ++i) {

@@ -179,6 +179,7 @@ struct SimConfig {
   TrajectoryBody trajectory_body = TrajectoryBody::kAuto;
   Traffic traffic = Traffic::kNone;
   double caustics = 1.0;
+  double snow = 0.0;
   bool own_shadow = false;
   Body own_body = Body::kNone;
   int threads = 2;
@@ -208,6 +209,10 @@ struct SimConfig {
       "all but the lorry");
     v("caustics", caustics,
       "the sun's light that waves throw over the pool's floor, over what suits it; 0: none");
+    v("snow", snow,
+      "flakes about the cameras, in thousands: within 2 m they drift in the pool's water, within 4 "
+      "m "
+      "they fall elsewhere");
     v("own_shadow", own_shadow, "a rover carries the cameras, whose shadow moves with them");
     v("own_body", own_body, "what the cameras see of their vehicle: none, bonnet or arms");
     v("threads", threads, "1 or 2: cameras rendered at once; changes no pixel");

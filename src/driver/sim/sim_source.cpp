@@ -69,10 +69,19 @@ OwnBody own_body(const SimConfig& config, const StereoRig& rig, Side side, doubl
   return {config.own_body, rig, side, rays, place_lamps(config.lamps, rig, side, haze)};
 }
 
+/// Flakes of marine snow, more of what drifts in the pool anyway, or of snow that falls.
+void let_it_snow(double thousands, std::uint64_t seed, Scene* scene) {
+  if (thousands <= 0.0) return;
+  Particles& p = scene->particles;
+  if (p.count == 0) p = {0, 8.0, 0.004, 0.9F, {0.4, 0.15, -1.2}, combine(seed, 24)};
+  p.count += static_cast<int>(std::lround(1000.0 * thousands));
+}
+
 /// The world as the configuration has it.
 Scene scene_of(const SimConfig& config, const Motion& motion) {
   Scene scene = build_scene(config.world, motion, config.seed, config.traffic);
   scene.caustic_strength *= static_cast<float>(config.caustics);
+  let_it_snow(config.snow, config.seed, &scene);
   return scene;
 }
 
@@ -108,6 +117,7 @@ Result<void> check(const SimConfig& config) {
   if (!(config.caustics >= 0.0 && config.caustics <= 5.0)) {
     return Error{"caustics must be in [0, 5]"};
   }
+  if (!(config.snow >= 0.0 && config.snow <= 1000.0)) return Error{"snow must be in [0, 1000]"};
   const bool road = config.world == World::kStreet || config.world == World::kHighway;
   if (config.traffic != Traffic::kNone && !road) {
     return Error{

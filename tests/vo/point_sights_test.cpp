@@ -91,5 +91,28 @@ TEST(MovingLight, IsFoundInWhatAWindowShows) {
   }
 }
 
+/// Points that come nearer without leaving their pixels tell of nothing but distance, and points
+/// that move across the beam at one distance of nothing but the beam.
+TEST(MovingLight, DistanceAndBeamCountEachByItself) {
+  for (const bool beam : {false, true}) {
+    PointSights seen(1);
+    for (int i = 0; i < 150; ++i) {
+      PointSight s;
+      s.u_host = 20.0 + 1.8 * i;
+      s.v_host = s.v = 30.0 + (37 * i) % 140;
+      s.u = beam ? s.u_host + (i % 2 == 0 ? 25.0 : -25.0) : s.u_host;
+      s.depth_ratio = beam ? 1.0 : 0.7 + 0.004 * ((53 * i) % 150);
+      const double across =
+          ((s.u - 160.0) * (s.u - 160.0) - (s.u_host - 160.0) * (s.u_host - 160.0));
+      s.grey_host = 90.0;
+      s.grey = 90.0 * std::pow(s.depth_ratio, -1.5) * std::exp(-across / (150.0 * 150.0));
+      seen[0].push_back(s);
+    }
+    MovingLight light{MovingLightConfig()};
+    for (int i = 0; i < 6; ++i) light.observe(sights_camera(), seen);
+    EXPECT_TRUE(light.found()) << (beam ? "beam" : "distance");
+  }
+}
+
 }  // namespace
 }  // namespace sovo

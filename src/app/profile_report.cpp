@@ -62,7 +62,7 @@ std::string run_summary(const ProfileCollector& profile, const RunCounts& counts
   text += fmt::format("frames refused   {}, dropped {}\n", counts.rejected, counts.dropped);
   text += fmt::format("keyframes        {} ({:.3f} a frame; {:.0f} points, {:.0f} residuals)\n",
                       counts.keyframes, keyframes_per_frame(counts), work.points, work.residuals);
-  text += fmt::format("track lost       {} times\n", counts.lost_segments);
+  text += fmt::format("new segments     {}\n", counts.new_segments);
   if (loops) {
     text += fmt::format("loops closed     {} (places {}, views matched {}, impossible {})\n",
                         loops->closures, loops->places, loops->matched, loops->refused);

@@ -9,7 +9,7 @@ void RunRecorder::on_frame(const OdometryOutput& output) {
   if (counts_.fed == 0) first_segment_ = output.segment;
   ++counts_.fed;
   counts_.tracked += output.pose_valid ? 1 : 0;
-  counts_.lost_segments = output.segment - first_segment_;
+  counts_.new_segments = output.segment - first_segment_;
   counts_.rejected = output.rejected;
   counts_.dropped = output.dropped_queue;
   counts_.corner_light = output.corner_light;

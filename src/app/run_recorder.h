@@ -15,7 +15,7 @@ struct RunCounts {
   std::uint64_t fed = 0;                          ///< Frames given to the odometry.
   std::uint64_t tracked = 0;                      ///< Of them, with a valid pose.
   std::uint64_t keyframes = 0;                    ///< Distinct ones given out.
-  std::uint64_t lost_segments = 0;                ///< Times the track was lost.
+  std::uint64_t new_segments = 0;                 ///< After the first.
   std::uint64_t rejected = 0;                     ///< Frames refused.
   std::uint64_t dropped = 0;                      ///< Frames that mapping had no time for.
   std::uint32_t queue_depth = 0;                  ///< Frames that wait for mapping.

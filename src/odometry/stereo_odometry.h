@@ -122,9 +122,8 @@ struct StereoOdometryConfig {
     v("depth_init", depth_init, "where a new point's first depth interval comes from");
     v("assist", assist, "depth_init: auto, when stereo matching helps");
     v("lighting", lighting,
-      "what lights the scene: world for the sun, vehicle for lamps that move with the cameras, "
-      "auto "
-      "to find out");
+      "what lights the scene: world for the sun, vehicle for lamps that move with the cameras; "
+      "auto finds out");
     v("moving_light", moving_light, "lighting: auto, when lamps are believed to move along");
     v("local_contrast", local_contrast,
       "where lamps move along, how images are freed of their light");

@@ -10,7 +10,6 @@
 #include "sovo/vo/keyframe_slopes.h"
 #include "sovo/vo/marginalization.h"
 #include "sovo/vo/moving_light.h"
-#include "sovo/vo/point_sights.h"
 #include "sovo/vo/stage_timer.h"
 #include "sovo/vo/static_residual.h"
 #include "sovo/vo/staying_cells.h"
@@ -252,9 +251,9 @@ void DirectOdometry::leave_out_co_moving() {
 
 void DirectOdometry::observe_light() {
   if (light_.vignette == nullptr && light_.moving == nullptr) return;
-  const PointSights seen = sights_in_newest(window_);
-  if (light_.vignette != nullptr) light_.vignette->observe(window_, seen);
-  if (light_.moving != nullptr) light_.moving->observe(camera_, seen);
+  find_sights_in_newest(window_, &sights_);
+  if (light_.vignette != nullptr) light_.vignette->observe(window_, sights_);
+  if (light_.moving != nullptr) light_.moving->observe(camera_, sights_);
 }
 
 MapResult DirectOdometry::make_keyframe(const TrackedFrame& tracked, const SE3& T_world_camera,

@@ -21,6 +21,7 @@
 #include "sovo/vo/motion_model.h"
 #include "sovo/vo/pixel_selector.h"
 #include "sovo/vo/point_activation.h"
+#include "sovo/vo/point_sights.h"
 #include "sovo/vo/window.h"
 #include "sovo/vo/worker_pool.h"
 
@@ -172,6 +173,7 @@ class DirectOdometry final : public MonocularBackend {
   MotionCheck motion_check_;
   ExposureEstimate exposure_;
   LightObservers light_;
+  PointSights sights_;
   PixelSelector selector_;
   double lasting_share_ = 1.0;  ///< Of the pixels selected last, in view of the next keyframe.
   PointActivator activator_;

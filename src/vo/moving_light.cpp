@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "sovo/vo/median.h"
+
 namespace sovo {
 
 namespace {
@@ -16,7 +18,7 @@ constexpr std::size_t kFewestInPair = 20;
 constexpr std::size_t kFewestInAll = 100;
 constexpr double kDarkestGrey = 8.0;      ///< Grey levels between which logarithms
 constexpr double kBrightestGrey = 248.0;  ///< are compared.
-constexpr double kLeastScatter = 0.003;
+constexpr double kLeastLightScatter = 0.003;
 constexpr double kLightHuber = 1.345;  ///< Standard deviations.
 
 bool is_clear(double grey) { return grey > kDarkestGrey && grey < kBrightestGrey; }
@@ -33,12 +35,6 @@ LightSight light_sight(const CameraModel& camera, const PointSight& s) {
   return sight;
 }
 
-double take_median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 bool has_enough(const std::vector<LightSight>& pair) { return pair.size() >= kFewestInPair; }
 
 /// Of the pairs that have enough.
@@ -46,27 +42,6 @@ std::size_t count_sights(const std::vector<std::vector<LightSight>>& pairs) {
   std::size_t count = 0;
   for (const auto& pair : pairs) count += has_enough(pair) ? pair.size() : 0;
   return count;
-}
-
-/// What `light` leaves of the logarithms, about the median of each pair that has enough.
-std::vector<double> left_by(const Vec6& light, const std::vector<std::vector<LightSight>>& pairs) {
-  std::vector<double> left;
-  left.reserve(count_sights(pairs));
-  std::vector<double> of_pair;
-  for (const auto& pair : pairs) {
-    if (!has_enough(pair)) continue;
-    of_pair.clear();
-    of_pair.reserve(pair.size());
-    for (const LightSight& s : pair) of_pair.push_back(s.log_ratio - light.dot(s.terms));
-    const double middle = take_median(of_pair);
-    for (const double e : of_pair) left.push_back(e - middle);
-  }
-  return left;
-}
-
-double scatter_of(std::vector<double> errors) {
-  for (double& e : errors) e = std::abs(e);
-  return std::max(1.48 * take_median(std::move(errors)), kLeastScatter);
 }
 
 }  // namespace
@@ -77,18 +52,17 @@ bool MovingLight::found() const {
 }
 
 void MovingLight::observe(const CameraModel& camera, const PointSights& seen) {
-  Pairs pairs;
-  pairs.reserve(seen.size());
-  for (const auto& of_host : seen) {
-    std::vector<LightSight>& pair = pairs.emplace_back();
-    pair.reserve(of_host.size());
-    for (const PointSight& s : of_host) {
+  pairs_.resize(seen.size());
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    pairs_[i].clear();
+    pairs_[i].reserve(seen[i].size());
+    for (const PointSight& s : seen[i]) {
       if (is_clear(s.grey) && is_clear(s.grey_host) && s.depth_ratio > 0.0) {
-        pair.push_back(light_sight(camera, s));
+        pairs_[i].push_back(light_sight(camera, s));
       }
     }
   }
-  observe(pairs);
+  observe(pairs_);
 }
 
 void MovingLight::observe(const std::vector<std::vector<LightSight>>& pairs) {
@@ -97,9 +71,28 @@ void MovingLight::observe(const std::vector<std::vector<LightSight>>& pairs) {
   learn(pairs);
 }
 
+void MovingLight::find_left(const Vec6& light, const Pairs& pairs) {
+  left_.clear();
+  left_.reserve(count_sights(pairs));
+  for (const auto& pair : pairs) {
+    if (!has_enough(pair)) continue;
+    of_pair_.clear();
+    of_pair_.reserve(pair.size());
+    for (const LightSight& s : pair) of_pair_.push_back(s.log_ratio - light.dot(s.terms));
+    const double middle = median(of_pair_, &scratch_);
+    for (const double e : of_pair_) left_.push_back(std::abs(e - middle));
+  }
+}
+
+double MovingLight::scatter() {
+  return std::max(1.48 * median(left_, &scratch_), kLeastLightScatter);
+}
+
 void MovingLight::judge(const Pairs& pairs) {
-  const double before = scatter_of(left_by(Vec6::Zero(), pairs));
-  const double after = scatter_of(left_by(light_, pairs));
+  find_left(Vec6::Zero(), pairs);
+  const double before = scatter();
+  find_left(light_, pairs);
+  const double after = scatter();
   judged_ = kForgetJudged * judged_ + 1.0;
   log_left_ = kForgetJudged * log_left_ + std::log(after / before);
   log_scatter_ = kForgetJudged * log_scatter_ + std::log(before);
@@ -111,8 +104,8 @@ void MovingLight::judge(const Pairs& pairs) {
 
 /// The brightness of each pair is eliminated.
 void MovingLight::learn(const Pairs& pairs) {
-  const std::vector<double> errors = left_by(light_, pairs);
-  const double sigma = scatter_of(errors);
+  find_left(light_, pairs);
+  const double sigma = scatter();
   H_ *= kForgetLight;
   g_ *= kForgetLight;
   std::size_t i = 0;
@@ -122,8 +115,8 @@ void MovingLight::learn(const Pairs& pairs) {
     Vec6 mean = Vec6::Zero(), product = Vec6::Zero();
     Mat6 square = Mat6::Zero();
     for (const LightSight& s : pair) {
-      const double e = std::abs(errors[i++]);
-      const double w = std::min(1.0, kLightHuber * sigma / std::max(e, sigma)) / (sigma * sigma);
+      const double e = std::max(left_[i++], kLightHuber * sigma);
+      const double w = kLightHuber / (sigma * e);
       sum += w;
       ratio += w * s.log_ratio;
       mean += w * s.terms;

@@ -34,8 +34,8 @@ struct LightSight {
 ///
 /// The light is modelled as exp(a log(1/z) + a quadratic of the place in the image), and fitted to
 /// how the logarithm of points' brightness changes between keyframes. What was fitted to the
-/// keyframes before is compared with what the newest one shows: by daylight it explains nothing
-/// there, by lamps most of it.
+/// keyframes before is tried on what the newest one shows: by daylight it explains hardly anything
+/// there, by lamps a quarter of the scatter and more.
 class MovingLight {
  public:
   explicit MovingLight(const MovingLightConfig& config) : config_(config) {}
@@ -54,6 +54,9 @@ class MovingLight {
   using Pairs = std::vector<std::vector<LightSight>>;
   void judge(const Pairs& pairs);
   void learn(const Pairs& pairs);
+  /// Fills left_ with what `light` leaves of the logarithms of the pairs that have enough.
+  void find_left(const Vec6& light, const Pairs& pairs);
+  double scatter();  ///< Standard deviation of what is left, robustly.
 
   MovingLightConfig config_;
   // Least squares in the terms c of the light: H c = g.
@@ -64,6 +67,10 @@ class MovingLight {
   double judged_ = 0.0;       ///< Keyframes, older ones less.
   double log_left_ = 0.0;     ///< Sum over those: of the share of the scatter that is left.
   double log_scatter_ = 0.0;  ///< The same of the scatter.
+
+  Pairs pairs_;
+  std::vector<double> left_;  ///< Absolute, about the median of each pair.
+  std::vector<double> of_pair_, scratch_;
 
   mutable std::mutex mutex_;
   bool found_ = false;

@@ -29,13 +29,13 @@ double mean_seen(const ImageF& image, const PatternProjection& seen) {
   return mean_of(grey);
 }
 
-std::vector<PointSight> sights_of(const Window& window, int host) {
+void find_sights(const Window& window, int host, std::vector<PointSight>* sights) {
   const int newest = window.size() - 1;
   const auto slot = static_cast<std::size_t>(window.newest().slot);
   const PairGeometry& pair = window.pair(host, newest);
   PatternProjection seen;
-  std::vector<PointSight> sights;
-  sights.reserve(window[host].points.size());
+  sights->clear();
+  sights->reserve(window[host].points.size());
   for (const Point& p : window[host].points) {
     if (p.residuals[slot].state != ResidualState::kIn) continue;
     project_pattern(window, host, newest, p, &seen);
@@ -50,18 +50,17 @@ std::vector<PointSight> sights_of(const Window& window, int host) {
     const Eigen::Vector3f at =
         pair.KRKi * Eigen::Vector3f(p.u, p.v, 1.0F) + static_cast<float>(p.rho) * pair.Kt;
     s.depth_ratio = static_cast<double>(at.z());
-    sights.push_back(s);
+    sights->push_back(s);
   }
-  return sights;
 }
 
 }  // namespace
 
-PointSights sights_in_newest(const Window& window) {
-  PointSights sights;
-  sights.reserve(static_cast<std::size_t>(window.size()));
-  for (int host = 0; host + 1 < window.size(); ++host) sights.push_back(sights_of(window, host));
-  return sights;
+void find_sights_in_newest(const Window& window, PointSights* sights) {
+  sights->resize(static_cast<std::size_t>(window.size() - 1));
+  for (int host = 0; host + 1 < window.size(); ++host) {
+    find_sights(window, host, &(*sights)[static_cast<std::size_t>(host)]);
+  }
 }
 
 }  // namespace sovo

@@ -17,7 +17,7 @@ struct PointSight {
 /// By host, in the order of the window.
 using PointSights = std::vector<std::vector<PointSight>>;
 
-/// What the newest keyframe shows of the points of the others.
-PointSights sights_in_newest(const Window& window);
+/// What the newest keyframe shows of the points of the others, in the memory of what `sights` was.
+void find_sights_in_newest(const Window& window, PointSights* sights);
 
 }  // namespace sovo

@@ -7,20 +7,13 @@
 #include <utility>
 
 #include "sovo/vo/image_rotation.h"
+#include "sovo/vo/median.h"
 
 namespace sovo {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 constexpr int kRotationAlignmentWidth = 120;  // the widest level that rotation is aligned on [px]
-
-template <class T>
-T median(std::vector<T>* values) {
-  if (values->empty()) return T(0);
-  const auto middle = values->begin() + static_cast<std::ptrdiff_t>(values->size() / 2);
-  std::nth_element(values->begin(), middle, values->end());
-  return *middle;
-}
 
 /// A pixel whose inverse depth is known.
 struct KnownDepth {

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <optional>
 
+#include "sovo/vo/median.h"
+
 namespace sovo {
 
 namespace {
@@ -54,14 +56,6 @@ std::optional<View> view_of(const OffAxis& off_axis, const CameraModel& camera,
 int quarter_of(const View& view) {
   if (std::abs(view.x) > std::abs(view.y)) return view.x > 0.0 ? 0 : 2;
   return view.y > 0.0 ? 1 : 3;
-}
-
-/// `scratch` is memory to sort them in.
-double median(const std::vector<double>& values, std::vector<double>* scratch) {
-  *scratch = values;
-  const auto middle = scratch->begin() + static_cast<std::ptrdiff_t>(scratch->size() / 2);
-  std::nth_element(scratch->begin(), middle, scratch->end());
-  return *middle;
 }
 
 /// Of the logarithm of the grey levels as they came, as if nothing had given way to it.

@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <cmath>
 #include <cstddef>
 #include <string>
@@ -13,23 +12,9 @@ namespace sovo::sim {
 namespace {
 
 SimConfig with_caustics(double caustics, World world = World::kPool) {
-  SimConfig config;
-  config.world = world;
+  SimConfig config = clear_pictures(world, 1);
   config.caustics = caustics;
-  config.frames = 1;
-  config.sensor.auto_exposure = false;
-  config.sensor.exposure_ms = 2.0;  // dark enough that no light is cut off
-  config.sensor.read_noise = config.sensor.shot_noise = 0.0;
   return config;
-}
-
-StereoFrame seen(const SimConfig& config) {
-  Calibration calibration;
-  calibration.rig = vehicle_rig();
-  SimSource source(config, calibration, own_motion(config.world));
-  const SourceResult result = source.next(std::chrono::seconds(60));
-  EXPECT_EQ(result.state, SourceState::kFrame) << result.message;
-  return result.frame;
 }
 
 double mean_difference(const SideImage& a, const SideImage& b) {
@@ -41,9 +26,9 @@ double mean_difference(const SideImage& a, const SideImage& b) {
 }
 
 TEST(SimCaustics, AreAsStrongAsAskedForAndTheSameInBothImages) {
-  const StereoFrame none = seen(with_caustics(0.0));
-  const StereoFrame some = seen(with_caustics(1.0));
-  const StereoFrame strong = seen(with_caustics(2.0));
+  const StereoFrame none = last_pair(with_caustics(0.0));
+  const StereoFrame some = last_pair(with_caustics(1.0));
+  const StereoFrame strong = last_pair(with_caustics(2.0));
   const double once = mean_difference(some.left, none.left);
   EXPECT_GT(once, 0.5);
   EXPECT_NEAR(mean_difference(strong.left, none.left), 2.0 * once, 0.2 * once);
@@ -51,8 +36,8 @@ TEST(SimCaustics, AreAsStrongAsAskedForAndTheSameInBothImages) {
 }
 
 TEST(SimCaustics, AreNotSeenOnDryLand) {
-  const StereoFrame none = seen(with_caustics(0.0, World::kLawn));
-  const StereoFrame strong = seen(with_caustics(3.0, World::kLawn));
+  const StereoFrame none = last_pair(with_caustics(0.0, World::kLawn));
+  const StereoFrame strong = last_pair(with_caustics(3.0, World::kLawn));
   EXPECT_EQ(*none.left.data, *strong.left.data);
 }
 

@@ -120,7 +120,7 @@ TEST(Allocations, AFrameMakesNoneInTheSteadyState) {
     // The list of all frames, of which the refined trajectory is made, doubles now and then.
     EXPECT_LE(frames_that_do, 1);
     // What a keyframe gives out is new; each list is allocated at once.
-    for (const long n : made.keyframe) EXPECT_LT(n, 430);
+    for (const long n : made.keyframe) EXPECT_LT(n, 400);
   }
 }
 

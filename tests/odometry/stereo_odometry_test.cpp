@@ -59,8 +59,43 @@ double brightness_at(const ImagePyramid& image, int x, int y) {
   return sum / (kSide * kSide);
 }
 
+TEST(StereoOdometry, LampsThatMoveWithTheCamerasAreFoundAndANewSegmentGoesOn) {
+  for (const bool deterministic : {true, false}) {
+    StereoOdometryConfig config = test_config();
+    config.deterministic = deterministic;
+    config.wait_for_mapping = true;
+    Playback run(config);
+    for (int i = 0; i < 2 * kDriveFrames; ++i) run.give(lamp_frame(i));
+    run.odometry.finish();
+    const std::vector<OdometryOutput>& frames = run.recorder.frames;
+    int said = 0;
+    for (const OdometryOutput& o : frames) {
+      EXPECT_TRUE(o.pose_valid) << o.reason;
+      EXPECT_EQ(o.state, OdometryState::kTracking) << o.reason;
+      said += o.reason == "lamps that move along light the scene; a new segment begins" ? 1 : 0;
+    }
+    EXPECT_EQ(said, 1);
+    EXPECT_EQ(frames.back().segment, 1U);
+    expect_follows_the_drive(published(run.recorder), 0.03, 0.05);
+  }
+}
+
+TEST(StereoOdometry, NoLampsAreFoundWhereThereAreNone) {
+  StereoOdometryConfig config = test_config();
+  Playback daylight(config);
+  daylight.give_drive(0, 2 * kDriveFrames);
+  EXPECT_EQ(daylight.recorder.frames.back().segment, 0U);
+  config.lighting = Lighting::kWorld;
+  Playback told(config);
+  for (int i = 0; i < 2 * kDriveFrames; ++i) told.give(lamp_frame(i));
+  for (const OdometryOutput& o : told.recorder.frames) {
+    EXPECT_EQ(o.reason.find("lamps"), std::string::npos);
+  }
+}
+
 TEST(StereoOdometry, LampsThatMoveWithTheCamerasAreNoMotion) {
   StereoOdometryConfig config = test_config();
+  config.lighting = Lighting::kWorld;
   const auto fly = [&config] {
     Playback run(config);
     for (int i = 0; i < kDriveFrames; ++i) run.give(lamp_frame(i));

@@ -61,7 +61,7 @@ Window window_of_patches(double lamps) {
 
 TEST(PointSights, ShowWhereAPointIsHowBrightAndHowMuchNearer) {
   const Window window = window_of_patches(1.5);
-  const PointSights seen = sights_in_newest(window);
+  const PointSights seen = test::sights_in_newest(window);
   ASSERT_EQ(seen.size(), 1U);
   ASSERT_GT(seen[0].size(), 100U);
   for (const PointSight& s : seen[0]) {
@@ -76,17 +76,17 @@ TEST(PointSights, ShowWhereAPointIsHowBrightAndHowMuchNearer) {
 
 TEST(PointSights, AreOfInliersOnly) {
   Window window = window_of_patches(0.0);
-  const std::size_t all = sights_in_newest(window)[0].size();
+  const std::size_t all = test::sights_in_newest(window)[0].size();
   window[0].points[50].residuals[static_cast<std::size_t>(window[1].slot)].state =
       ResidualState::kOutlier;
-  EXPECT_EQ(sights_in_newest(window)[0].size(), all - 1);
+  EXPECT_EQ(test::sights_in_newest(window)[0].size(), all - 1);
 }
 
 TEST(MovingLight, IsFoundInWhatAWindowShows) {
   for (const double lamps : {0.0, 1.5}) {
     const Window window = window_of_patches(lamps);
     MovingLight light{MovingLightConfig()};
-    for (int i = 0; i < 6; ++i) light.observe(sights_camera(), sights_in_newest(window));
+    for (int i = 0; i < 6; ++i) light.observe(sights_camera(), test::sights_in_newest(window));
     EXPECT_EQ(light.found(), lamps > 0.0) << lamps;
   }
 }

@@ -178,7 +178,7 @@ TEST(VignetteEstimate, SpotsThatGrowDarkerAsTheyComeNearerAreNone) {
   }
   const Window window = window_of_spots(spots, 1.0);
   VignetteEstimate estimate(some_camera());
-  for (int i = 0; i < 10; ++i) estimate.observe(window, sights_in_newest(window));
+  for (int i = 0; i < 10; ++i) estimate.observe(window, test::sights_in_newest(window));
   EXPECT_GT(estimate.current().log_at(1.0), -0.02);
 }
 

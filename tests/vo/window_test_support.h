@@ -10,6 +10,7 @@
 #include "sovo/vo/epipolar_search.h"
 #include "sovo/vo/linearization.h"
 #include "sovo/vo/photometric_problem.h"
+#include "sovo/vo/point_sights.h"
 #include "sovo/vo/window.h"
 #include "support/cameras.h"
 #include "support/pyramids.h"
@@ -66,6 +67,12 @@ inline Point make_point(const ImageF& image, int u, int v, double rho) {
   p.weight = immature.weight;
   p.rho = rho;
   return p;
+}
+
+inline PointSights sights_in_newest(const Window& window) {
+  PointSights sights;
+  find_sights_in_newest(window, &sights);
+  return sights;
 }
 
 /// A lens that is not quite sharp: binomial blur, so that bilinear interpolation loses nothing.

@@ -210,9 +210,9 @@ struct SimConfig {
     v("caustics", caustics,
       "the sun's light that waves throw over the pool's floor, over what suits it; 0: none");
     v("snow", snow,
-      "flakes about the cameras, in thousands: within 2 m they drift in the pool's water, within 4 "
-      "m "
-      "they fall elsewhere");
+      "flakes about the cameras, in thousands: in the pool's water they drift within 2 m, "
+      "elsewhere "
+      "they fall within 4 m");
     v("own_shadow", own_shadow, "a rover carries the cameras, whose shadow moves with them");
     v("own_body", own_body, "what the cameras see of their vehicle: none, bonnet or arms");
     v("threads", threads, "1 or 2: cameras rendered at once; changes no pixel");

@@ -66,6 +66,16 @@ void show_camera(const std::string& side, const CameraModel& camera,
             << "\n";
 }
 
+void show_port(const std::string& side, const CameraModel& camera) {
+  if (!camera.port) return;
+  const FlatPort& port = *camera.port;
+  const auto millimetres = [](double v) { return format_fixed(1e3 * v, 1) + " mm"; };
+  std::cout << side << ": behind a flat port, " << millimetres(port.distance) << " away and "
+            << millimetres(port.thickness) << " thick, of index " << format_double(port.glass)
+            << ", in water of index " << format_double(port.water) << "; rays meet, in the mean, "
+            << millimetres(-port.centre) << " behind the camera\n";
+}
+
 int show(const CalibOptions& options) {
   const auto calibration = load(options, false);
   if (!calibration) return fail(kBadInput, calibration.error());
@@ -75,6 +85,8 @@ int show(const CalibOptions& options) {
   std::cout << "format: " << calibration->format << "\nname: " << rig.name << "\n";
   show_camera("left", rig.left, calibration->left_photometric, calibration->left_mask);
   show_camera("right", rig.right, calibration->right_photometric, calibration->right_mask);
+  show_port("left", rig.left);
+  show_port("right", rig.right);
   std::cout << "baseline: " << format_fixed(rig.baseline(), 6)
             << " m, left origin in the right frame (" << format_fixed(t.x(), 6) << ", "
             << format_fixed(t.y(), 6) << ", " << format_fixed(t.z(), 6) << ") m, turned by "

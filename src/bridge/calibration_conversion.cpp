@@ -1,7 +1,9 @@
 #include "sovo/bridge/calibration_conversion.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 #include "sovo/bridge/borrow.h"
 #include "sovo/bridge/ros_conversion.h"
@@ -10,6 +12,9 @@
 namespace sovo::bridge {
 namespace {
 
+constexpr const char* kPinhole = "pinhole";
+constexpr const char* kFlatPort = "pinhole_flat_port";
+constexpr std::size_t kPortNumbers = 8;
 constexpr float kVignetteScale = 65535.0F;
 constexpr std::size_t kResponseSize = 256;
 constexpr double kLongestBaseline = 100.0;  // [m]; more is millimetres
@@ -26,6 +31,17 @@ Result<Distortion> distortion_of(const std::string& name, const std::string& cam
   }
   if (name == "equidistant") return Distortion::kEquidistant;
   return Error{camera + ".distortion_model is not one of none, radtan, equidistant"};
+}
+
+/// The numbers of a port, after those of the distortion.
+std::array<double, kPortNumbers> numbers_of(const FlatPort& p) {
+  return {p.distance,   p.thickness,  p.glass,      p.water,
+          p.normal.x(), p.normal.y(), p.normal.z(), p.centre};
+}
+
+std::optional<FlatPort> port_of(const double* d) {
+  const FlatPort port{d[0], d[1], d[2], d[3], Vec3(d[4], d[5], d[6]), d[7]};
+  return port.is_possible() ? std::optional(port) : std::nullopt;
 }
 
 bool fits(Distortion distortion, std::uint32_t coefficients) {
@@ -72,15 +88,18 @@ Result<CameraModel> from_message(const msg::CameraModel& m, const std::string& n
     return Error{name + ": size " + std::to_string(m.width) + "x" + std::to_string(m.height) +
                  " px is not between 1 and " + std::to_string(kLargestImage)};
   }
-  if (std::string(text_or_empty(m.model)) != "pinhole") {
-    return Error{name + ".model is not pinhole"};
+  const std::string model = text_or_empty(m.model);
+  if (model != kPinhole && model != kFlatPort) {
+    return Error{name + ".model is not pinhole or " + kFlatPort};
   }
   if (!all_finite(m.fx_fy_cx_cy, 4) || m.fx_fy_cx_cy[0] <= 0.0 || m.fx_fy_cx_cy[1] <= 0.0) {
     return Error{name + ".fx_fy_cx_cy has a focal length that is not positive, or no number"};
   }
   const auto distortion = distortion_of(text_or_empty(m.distortion_model), name);
   if (!distortion) return distortion.failure();
-  if (!fits(*distortion, m.d._length) || !all_finite(m.d._buffer, m.d._length)) {
+  const std::uint32_t of_port = model == kFlatPort ? kPortNumbers : 0;
+  if (m.d._length < of_port || !fits(*distortion, m.d._length - of_port) ||
+      !all_finite(m.d._buffer, m.d._length)) {
     return Error{name + ".d: " + to_string(*distortion) + " with " + std::to_string(m.d._length) +
                  " coefficients, or one that is not a number"};
   }
@@ -93,9 +112,14 @@ Result<CameraModel> from_message(const msg::CameraModel& m, const std::string& n
   camera.cy = m.fx_fy_cx_cy[3];
   camera.distortion = *distortion;
   if (*distortion != Distortion::kNone) {
-    std::copy_n(m.d._buffer, m.d._length, camera.d.begin());
-    camera.num_coefficients = static_cast<int>(m.d._length);
+    const std::uint32_t coefficients = m.d._length - of_port;
+    std::copy_n(m.d._buffer, coefficients, camera.d.begin());
+    camera.num_coefficients = static_cast<int>(coefficients);
   }
+  if (of_port == 0) return camera;
+  const auto port = port_of(m.d._buffer + m.d._length - of_port);
+  if (!port) return Error{name + ".d: its last eight numbers are not those of a flat port"};
+  camera.port = *port;
   return camera;
 }
 
@@ -104,6 +128,10 @@ msg::CameraModel CalibrationMessage::fill(const CameraModel& camera,
                                           Camera* storage) {
   storage->distortion = to_string(camera.distortion);
   storage->coefficients.assign(camera.d.begin(), camera.d.begin() + camera.num_coefficients);
+  if (camera.port) {
+    const auto numbers = numbers_of(*camera.port);
+    storage->coefficients.insert(storage->coefficients.end(), numbers.begin(), numbers.end());
+  }
   storage->response.assign(photometric.inverse_response.begin(),
                            photometric.inverse_response.end());
   storage->vignette.resize(photometric.vignette.size());
@@ -115,7 +143,7 @@ msg::CameraModel CalibrationMessage::fill(const CameraModel& camera,
   msg::CameraModel m{};
   m.width = static_cast<std::uint32_t>(camera.width);
   m.height = static_cast<std::uint32_t>(camera.height);
-  m.model = borrow("pinhole");
+  m.model = borrow(camera.port ? kFlatPort : kPinhole);
   m.distortion_model = borrow(storage->distortion);
   const double intrinsics[] = {camera.fx, camera.fy, camera.cx, camera.cy};
   std::copy_n(intrinsics, 4, m.fx_fy_cx_cy);

@@ -11,6 +11,7 @@
 #include "sovo/bridge/stereo_frame_conversion.h"
 #include "sovo/bridge/topics.h"
 #include "sovo/bridge/writer.h"
+#include "sovo/geometry/radtan_fit.h"
 #include "sovo/io/jpeg_encoder.h"
 
 namespace sovo::bridge {
@@ -190,14 +191,15 @@ Result<std::unique_ptr<CameraViews>> CameraViews::open(const Participant& partic
   std::unique_ptr<CameraViews> views(
       new CameraViews(std::move(*diagnostics),
                       CameraHealth(participant.config().ns + ": camera", cameras.rig.name)));
-  const StereoRectification rectification = rectify(cameras.rig);
+  const StereoRig rig = without_ports(cameras.rig);
+  const StereoRectification rectification = rectify(rig);
   for (const bool is_left : {true, false}) {
     auto side = Side::open(participant, is_left ? "left/" : "right/");
     if (!side) return side.failure();
     Side& s = **side;
     s.frame_id = is_left ? left_frame : right_frame;
-    s.info_message.emplace(cameras.rig, rectification, is_left, s.frame_id);
-    s.camera = is_left ? cameras.rig.left : cameras.rig.right;
+    s.info_message.emplace(rig, rectification, is_left, s.frame_id);
+    s.camera = is_left ? rig.left : rig.right;
     s.rectified_camera = is_left ? rectification.left : rectification.right;
     s.R_rectified_raw = is_left ? rectification.R_left : rectification.R_right;
     (is_left ? views->left_ : views->right_) = std::move(*side);

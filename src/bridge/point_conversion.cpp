@@ -14,9 +14,9 @@ static_assert(std::endian::native == std::endian::little, "is_bigendian is writt
 
 /// Point i in the keyframe's left camera [m].
 Vec3 point_of(const KeyframeOutput& keyframe, std::size_t i, const CameraModel& tracked) {
-  const double depth = 1.0 / keyframe.inverse_depth[i];
-  return {depth * (keyframe.u[i] - tracked.cx) / tracked.fx,
-          depth * (keyframe.v[i] - tracked.cy) / tracked.fy, depth};
+  const Vec3 ray((keyframe.u[i] - tracked.cx) / tracked.fx,
+                 (keyframe.v[i] - tracked.cy) / tracked.fy, 1.0);
+  return ray / keyframe.inverse_depth[i] + tracked.ray_offset(ray);
 }
 
 }  // namespace
@@ -31,7 +31,7 @@ PointsInView points_in_view(const OdometryOutput& output, const KeyframeOutput& 
   for (std::size_t i = 0; i < keyframe.u.size(); ++i) {
     if (!(keyframe.inverse_depth[i] > 0.0F)) continue;
     const Vec3 point = T_now_keyframe * (growth * point_of(keyframe, i, tracked));
-    const auto pixel = raw_left.project(point);
+    const auto pixel = raw_left.project(raw_left.direction_of(point));
     if (!pixel || !raw_left.contains(*pixel)) continue;
     result.u.push_back(static_cast<float>(pixel->x()));
     result.v.push_back(static_cast<float>(pixel->y()));

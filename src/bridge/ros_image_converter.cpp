@@ -10,6 +10,7 @@
 #include "sovo/bridge/ros_conversion.h"
 #include "sovo/bridge/stereo_frame_conversion.h"
 #include "sovo/bridge/topics.h"
+#include "sovo/geometry/radtan_fit.h"
 
 namespace sovo::bridge {
 namespace {
@@ -63,10 +64,11 @@ Result<void> RosImageConverter::take_calibration(ByteSpan bytes) {
   const auto cameras = from_message(**message);
   if (!cameras) return cameras.failure();
   if (cameras->rig.baseline() < kLeastBaseline) return Error{"the calibration has no baseline"};
-  const StereoRectification rectification = rectify(cameras->rig);
+  const StereoRig rig = without_ports(cameras->rig);
+  const StereoRectification rectification = rectify(rig);
   const std::string left_frame = short_text((*message)->header.frame_id);
   for (const bool is_left : {true, false}) {
-    sides_[is_left ? 0 : 1].info_message.emplace(cameras->rig, rectification, is_left,
+    sides_[is_left ? 0 : 1].info_message.emplace(rig, rectification, is_left,
                                                  is_left ? left_frame : right_frame_of(left_frame));
   }
   return {};

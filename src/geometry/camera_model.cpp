@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <utility>
 
 namespace sovo {
 
@@ -69,6 +70,16 @@ std::optional<Vec2> CameraModel::project(const Vec3& point) const {
 }
 
 std::optional<Vec2> CameraModel::project(const Vec3& p, Mat23* jacobian) const {
+  if (!port || straightened) return project_in_air(p, jacobian);
+  Mat3 refraction;
+  const auto air = port->to_air(p, jacobian != nullptr ? &refraction : nullptr);
+  if (!air) return std::nullopt;
+  const auto pixel = project_in_air(*air, jacobian);
+  if (jacobian != nullptr) *jacobian = *jacobian * refraction;
+  return pixel;
+}
+
+std::optional<Vec2> CameraModel::project_in_air(const Vec3& p, Mat23* jacobian) const {
   if (distortion == Distortion::kEquidistant) {
     const double r = std::hypot(p.x(), p.y());
     const double theta = std::atan2(r, p.z());
@@ -113,6 +124,30 @@ std::optional<Vec2> CameraModel::project(const Vec3& p, Mat23* jacobian) const {
 }
 
 std::optional<Vec3> CameraModel::unproject(const Vec2& pixel) const {
+  const auto bearing = unproject_in_air(pixel);
+  return bearing && port && !straightened ? port->to_water(*bearing) : bearing;
+}
+
+Vec3 CameraModel::direction_of(const Vec3& point) const {
+  if (!port) return point;
+  // The offset at which the ray of the direction from there passes; it hardly depends on that, so
+  // secants lead to it at once.
+  constexpr int kRounds = 12;
+  const auto passed = [&](double offset) { return port->offset(point - offset * port->normal); };
+  double before = 0.0;
+  double error_before = passed(before);
+  double offset = error_before;
+  for (int i = 0; i < kRounds; ++i) {
+    const double error = passed(offset) - offset;
+    if (std::abs(error) < 1e-12 || error == error_before) break;
+    const double next = offset - error * (offset - before) / (error - error_before);
+    before = std::exchange(offset, next);
+    error_before = error;
+  }
+  return point - offset * port->normal;
+}
+
+std::optional<Vec3> CameraModel::unproject_in_air(const Vec2& pixel) const {
   const Vec2 q((pixel.x() - cx) / fx, (pixel.y() - cy) / fy);
   if (distortion == Distortion::kNone) return Vec3(q.x(), q.y(), 1.0).normalized();
 
@@ -162,6 +197,25 @@ CameraModel CameraModel::downscaled(int factor) const {
   out.cx = (cx + 0.5) / f - 0.5;
   out.cy = (cy + 0.5) / f - 0.5;
   return out;
+}
+
+std::optional<double> centre_behind_port(const CameraModel& camera) {
+  constexpr int kSteps = 32;
+  CameraModel from_own_centre = camera;
+  from_own_centre.port->centre = 0.0;
+  double sum = 0.0;
+  int count = 0;
+  for (int j = 0; j <= kSteps; ++j) {
+    for (int i = 0; i <= kSteps; ++i) {
+      const Vec2 pixel(i * (camera.width - 1.0) / kSteps, j * (camera.height - 1.0) / kSteps);
+      const auto direction = from_own_centre.unproject(pixel);
+      if (!direction) continue;
+      sum += from_own_centre.port->offset(*direction);
+      ++count;
+    }
+  }
+  if (4 * count < kSteps * kSteps) return std::nullopt;
+  return sum / count;
 }
 
 Mat3 CameraModel::matrix() const {

@@ -17,7 +17,8 @@ struct CurvePoint {
 };
 
 /// Where a pixel of one camera (the base) may appear in another (the target), as a function of
-/// its inverse depth rho: the projection of infinity + rho * slope, whatever the distortion.
+/// its inverse depth rho: the projection of infinity + rho * slope, whatever the distortion. Behind
+/// a port the target's ray passes beside its origin, by what hardly depends on rho.
 class EpipolarCurve {
  public:
   using Mat32 = Eigen::Matrix<double, 3, 2>;
@@ -34,9 +35,13 @@ class EpipolarCurve {
   /// Nothing where the target camera cannot see the point. rho may be slightly negative.
   std::optional<CurvePoint> at(double rho) const {
     Mat23 jacobian;
-    const auto pixel = target_->project(infinity_ + rho * slope_, &jacobian);
+    Vec3 slope = slope_;
+    for (int i = 0; target_->port && i < 2; ++i) {
+      slope = slope_ - target_->ray_offset(infinity_ + rho * slope);
+    }
+    const auto pixel = target_->project(infinity_ + rho * slope, &jacobian);
     if (!pixel) return std::nullopt;
-    return CurvePoint{*pixel, jacobian * slope_, jacobian * d_infinity_};
+    return CurvePoint{*pixel, jacobian * slope, jacobian * d_infinity_};
   }
 
   const CameraModel& target() const { return *target_; }
@@ -51,15 +56,15 @@ class EpipolarCurve {
 };
 
 /// Where a pixel of the left image, a pinhole's, may lie in the right one: X_right = R m + rho t,
-/// where rho is 1 / z in the left frame. `T_right_left`: that of the rig, or between the instants
-/// at which the two images were exposed (StereoRig::moved).
+/// where rho is 1 / z in the left frame; t is where the pixel's ray begins. `T_right_left`: that of
+/// the rig, or between the instants at which the two images were exposed (StereoRig::moved).
 inline EpipolarCurve right_curve(const StereoRig& rig, const SE3& T_right_left, const Vec2& pixel) {
   const Mat3 r = T_right_left.rotation_matrix();
   const Vec3 m((pixel.x() - rig.left.cx) / rig.left.fx, (pixel.y() - rig.left.cy) / rig.left.fy,
                1.0);
   EpipolarCurve::Mat32 d_infinity;
   d_infinity << r.col(0) / rig.left.fx, r.col(1) / rig.left.fy;
-  return {rig.right, r * m, T_right_left.translation(), d_infinity};
+  return {rig.right, r * m, T_right_left * rig.left.ray_offset(m), d_infinity};
 }
 
 /// Pixel of level 0 in the coordinates of pyramid level `level`.

@@ -31,8 +31,10 @@ std::optional<PatchSearch> backward_search(const StereoRig& rig, const ImagePyra
   if (!ray || !ray_x || !ray_y) return std::nullopt;
   EpipolarCurve::Mat32 d_infinity;
   d_infinity << r * (*ray_x - *ray), r * (*ray_y - *ray);
-  return PatchSearch{
-      &right, &left, pixel, {rig.left, r * *ray, T_left_right.translation(), d_infinity}};
+  return PatchSearch{&right,
+                     &left,
+                     pixel,
+                     {rig.left, r * *ray, T_left_right * rig.right.ray_offset(*ray), d_infinity}};
 }
 
 /// Inverse distance along the right ray of the point that has inverse depth rho in the left
@@ -203,7 +205,7 @@ void fill(const Alignment& aligned, const EpipolarCurve& curve, bool clamp, Stat
 
 StaticMatcher::StaticMatcher(const StaticMatcherConfig& config, const StereoRig& rig)
     : config_(config), rig_(rig) {
-  assert(rig.left.distortion == Distortion::kNone);
+  assert(rig.left.is_pinhole());
 }
 
 std::pair<float, float> StaticMatcher::whole_range() const {

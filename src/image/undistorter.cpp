@@ -100,11 +100,13 @@ struct Remap {
 }  // namespace
 
 CameraModel optimal_pinhole(const CameraModel& raw, const UndistortionConfig& config) {
-  if (raw.distortion == Distortion::kNone) return raw;
+  if (raw.is_pinhole()) return raw;
   const double max_fov = config.max_fov_deg * M_PI / 180.0;
   CameraModel pinhole;
   pinhole.width = raw.width;
   pinhole.height = raw.height;
+  pinhole.port = raw.port;
+  pinhole.straightened = raw.port.has_value();
   // The shortest focal length whose view still fits, by bisection on its logarithm.
   const double focal = std::sqrt(raw.fx * raw.fy);
   double too_wide = std::log(0.1 * focal);
@@ -124,11 +126,11 @@ Undistorter::Undistorter(const CameraModel& raw, const CameraModel& pinhole)
       height_(pinhole.height),
       raw_width_(raw.width),
       raw_height_(raw.height) {
-  assert(pinhole.distortion == Distortion::kNone && raw.width >= 2 && raw.height >= 2);
+  assert(pinhole.is_pinhole() && raw.width >= 2 && raw.height >= 2);
   assert(pinhole.width * pinhole.height >= static_cast<int>(kWideLanes));
-  identity_ = raw.distortion == Distortion::kNone && raw.width == pinhole.width &&
-              raw.height == pinhole.height && raw.fx == pinhole.fx && raw.fy == pinhole.fy &&
-              raw.cx == pinhole.cx && raw.cy == pinhole.cy;
+  identity_ = raw.is_pinhole() && raw.width == pinhole.width && raw.height == pinhole.height &&
+              raw.fx == pinhole.fx && raw.fy == pinhole.fy && raw.cx == pinhole.cx &&
+              raw.cy == pinhole.cy;
   if (identity_) return;
   const std::size_t size = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
   offset_.assign(size, -1);

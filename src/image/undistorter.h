@@ -20,10 +20,10 @@ struct UndistortionConfig {
   }
 };
 
-/// The pinhole camera without distortion, with square pixels (fx = fy), that keeps as much as it
-/// can of `raw`'s view while every pixel of the result sees a pixel of the raw image (up to one
-/// pixel at the edge), the same image size, and no more than the configured field of view. A camera
-/// without distortion is returned as it is.
+/// The pinhole camera without distortion, straightened where there is a port, with square pixels
+/// (fx = fy), that keeps as much as it can of `raw`'s view while every pixel of the result sees a
+/// pixel of the raw image (up to one pixel at the edge), the same image size, and no more than the
+/// configured field of view. A camera without distortion is returned as it is.
 CameraModel optimal_pinhole(const CameraModel& raw, const UndistortionConfig& config);
 
 /// Resamples images of `raw` as `pinhole` would see them. The table is made once.

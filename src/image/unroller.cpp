@@ -48,7 +48,8 @@ Unroller::Unroller(const CameraModel& raw, const CameraModel& result)
       nodes_x_((static_cast<std::size_t>(result.width) + kStep - 1) / kStep + 1),
       nodes_y_((static_cast<std::size_t>(result.height) + kStep - 1) / kStep + 1) {
   const bool same = raw.distortion == result.distortion && raw.fx == result.fx &&
-                    raw.fy == result.fy && raw.cx == result.cx && raw.cy == result.cy;
+                    raw.fy == result.fy && raw.cx == result.cx && raw.cy == result.cy &&
+                    raw.straightened == result.straightened;
   x_.assign(stride() * static_cast<std::size_t>(result.height), 0.0F);
   y_ = x_;
   for (int y = 0; y < result.height; ++y) {

@@ -12,7 +12,7 @@ namespace sovo {
 /// Undoes what turning does to the images of a rolling shutter, whose rows are exposed one after
 /// the other. Each pixel of the result shows what the raw image has on its ray, as that ray lies in
 /// the camera when the row was exposed where it shows. What moving straight on does depends on
-/// depths, and stays (RowShift).
+/// depths, and stays (ViewShift).
 class Unroller {
  public:
   /// From images of `raw` to those of `result`, a camera with the same axes, maybe the same one.

@@ -13,7 +13,7 @@ namespace sovo {
 
 /// All that is known about a pair of cameras.
 struct Calibration {
-  StereoRig rig;  ///< Raw (distorted) cameras.
+  StereoRig rig;  ///< Raw (distorted) cameras, and their ports.
   PhotometricCalibration left_photometric;
   PhotometricCalibration right_photometric;
   ImageU8 left_mask;  ///< 0 where the image must not be used; empty: all of it is used.
@@ -50,8 +50,14 @@ Result<Calibration> load_calibration(const std::string& path,
 /// focal lengths, principal points, values that are not finite, the baseline's unit and sign.
 std::vector<std::string> check_rig(const StereoRig& rig);
 
+/// Names of the files beside our own YAML, or empty.
+struct PhotometricFiles {
+  std::string left_response, left_vignette;
+  std::string right_response, right_vignette;
+};
+
 /// The rig as our own YAML.
-std::string format_sovo_calibration(const StereoRig& rig);
+std::string format_sovo_calibration(const StereoRig& rig, const PhotometricFiles& files = {});
 
 /// Texts of the two ROS camera_info files.
 struct CameraInfoPair {

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "sovo/geometry/radtan_fit.h"
 #include "sovo/io/calibration_formats.h"
 #include "sovo/io/text.h"
 
@@ -157,7 +158,8 @@ std::string camera_info(const std::string& name, const CameraModel& camera, cons
 
 }  // namespace
 
-CameraInfoPair format_ros_calibration(const StereoRig& rig) {
+CameraInfoPair format_ros_calibration(const StereoRig& given) {
+  const StereoRig rig = without_ports(given);
   const Rectification rectified = rectify(rig);
   MatX p(3, 4);
   p << rectified.focal, 0, rectified.cx, 0, 0, rectified.focal, rectified.cy, 0, 0, 0, 1, 0;

@@ -158,11 +158,12 @@ double FramePreparation::displacement(const Vec6& rate_difference, double rho) c
   return left_unroller_->reach(readout_s_ * rate_difference.tail<3>()) + rig().left.fx * rho * way;
 }
 
-RowShift FramePreparation::row_shift(const Vec6& rate, int halvings) const {
-  if (!left_unroller_) return {};
+ViewShift FramePreparation::view_shift(const Vec6& rate, int halvings) const {
+  ViewShift shift;
+  shift.axial = AxialRays::of(rig(halvings).left);
+  if (!left_unroller_) return shift;
   const int raw_rows = cameras_.rig.left.height / downscale_;
   const double seconds_a_row = readout_s_ / (raw_rows - 1) * left_unroller_->raw_rows();
-  RowShift shift;
   shift.per_row = (1 << halvings) * seconds_a_row * rate.head<3>();
   shift.middle =
       static_cast<double>(to_halved(static_cast<float>(left_unroller_->middle_row()), halvings));
@@ -202,7 +203,7 @@ MonoFrame FramePreparation::prepare_left(const StereoFrame& frame, StageObserver
                                          int halvings, const Vec6& rate) {
   MonoFrame out;
   out.rate = rate;
-  out.rows = row_shift(rate, halvings);
+  out.shift = view_shift(rate, halvings);
   out.stamp_ns = frame.stamp_ns;
   if (vignette_estimate_ && !left_contrast_) out.vignette = vignette_estimate_->current();
   // Without its light an image does not depend on its exposure.

@@ -83,7 +83,7 @@ class FramePreparation {
   }
   void add_resolutions(const StereoRig& rig, const ImageU8& mask, int max_halvings);
   void write_left(const SideImage& left, const Vec3& turn, ImageF* image);
-  RowShift row_shift(const Vec6& rate, int halvings) const;
+  ViewShift view_shift(const Vec6& rate, int halvings) const;
   /// Whether the pixels are resampled as they come, with nothing to be done before.
   bool takes_bytes(const SideImage& left) const;
 

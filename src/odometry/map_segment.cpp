@@ -64,6 +64,12 @@ void set_points(const KeyframePoints& points, const ImageF& image, int halvings,
   }
 }
 
+/// What a flat port does is known in metres, which a map may not be made of yet.
+MonoFrame without_metres(MonoFrame frame) {
+  frame.shift.axial.reset();
+  return frame;
+}
+
 }  // namespace
 
 MapSegment::MapSegment(const StereoOdometryConfig& config, const FramePreparation& preparation,
@@ -96,7 +102,7 @@ bool MapSegment::initialize(const MonoFrame& frame, const SideImage* right,
       return true;
     }
   }
-  if (!only_stereo) return initialize_from_two_views(frame, right, T_odom_left);
+  if (!only_stereo) return initialize_from_two_views(without_metres(frame), right, T_odom_left);
   if (right == nullptr) reason_ = "waiting for a right image to begin from stereo depth";
   return false;
 }
@@ -246,7 +252,9 @@ bool MapSegment::static_residuals() const {
 }
 
 TrackedFrame MapSegment::track(const MonoFrame& frame) {
-  return noted(vo_->track(frame, scale_status().locked ? config_.max_acceleration : 0.0));
+  const bool metric = scale_status().locked;
+  return noted(metric ? vo_->track(frame, config_.max_acceleration)
+                      : vo_->track(without_metres(frame), 0.0));
 }
 
 TrackedFrame MapSegment::track_from(const MonoFrame& frame, const SE3& T_current_reference) {

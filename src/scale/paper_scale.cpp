@@ -33,9 +33,9 @@ struct Level {
 std::optional<Vec2> project(const CameraModel& camera, const Vec3& X, const Vec3& t, double s,
                             Vec2* derivative) {
   const Vec3 P = s * X + t;
-  if (camera.distortion != Distortion::kNone) {  // the same by the chain rule
+  if (!camera.is_pinhole()) {  // the same by the chain rule
     Mat23 jacobian;
-    const auto pixel = camera.project(P, &jacobian);
+    const auto pixel = camera.project(camera.direction_of(P), &jacobian);
     if (pixel) *derivative = jacobian * X;
     return pixel;
   }
@@ -49,13 +49,12 @@ std::optional<Vec2> project(const CameraModel& camera, const Vec3& X, const Vec3
 /// Energy of eq. 4 and its normal equation at scale s.
 Sums accumulate(const ScalePoints& points, const Level& level, double s) {
   Sums sums;
-  const Vec3 t(static_cast<double>(points.t[0]), static_cast<double>(points.t[1]),
-               static_cast<double>(points.t[2]));
   for (std::size_t i = 0; i < static_cast<std::size_t>(points.size); ++i) {
     const Vec3 ray(static_cast<double>(points.mx[i]), static_cast<double>(points.my[i]),
                    static_cast<double>(points.mz[i]));
     const Vec3 X = ray / static_cast<double>(points.inverse_depth[i]);
     Vec2 dpi_ds;
+    const Vec3 t = points.translation(i).cast<double>();
     const auto pixel = project(level.camera, X, t, s, &dpi_ds);
     if (!pixel) continue;
     const auto x = static_cast<float>(pixel->x());

@@ -94,6 +94,45 @@ inline Moving equidistant(const Intrinsics& c, Direction q, Direction dq) {
   return {s * q.x, s * q.y, s_dot * q.x + s * dq.x, s_dot * q.y + s * dq.y, away(c.limit - theta)};
 }
 
+/// A flat port before the camera, in single precision.
+struct Pane {
+  float n[3];
+  float water, water2, glass2, distance, thickness, origin;
+};
+
+inline float dot(const float* n, Direction d) { return n[0] * d.x + n[1] * d.y + n[2] * d.z; }
+
+/// FlatPort::offset.
+inline float ray_offset(const Pane& pane, Direction q) {
+  constexpr float kLeast = 1e-4F;
+  const float along = dot(pane.n, q);
+  const float tan2 = (q.x * q.x + q.y * q.y + q.z * q.z) / (along * along) - 1.0F;
+  const float in_air = std::max(kLeast, 1.0F + (1.0F - pane.water2) * tan2);
+  const float in_glass = std::max(kLeast, pane.glass2 + (pane.glass2 - pane.water2) * tan2);
+  return pane.origin -
+         pane.water * (pane.distance / std::sqrt(in_air) + pane.thickness / std::sqrt(in_glass));
+}
+
+/// FlatPort::to_air, of a direction and of its derivative; returns how far off the normal light
+/// still comes from.
+inline float to_air(const Pane& pane, Direction* q, Direction* dq) {
+  const float along = dot(pane.n, *q);
+  const float along_dot = dot(pane.n, *dq);
+  const float squared = q->x * q->x + q->y * q->y + q->z * q->z;
+  const float squared_dot = q->x * dq->x + q->y * dq->y + q->z * dq->z;
+  const float root2 = (1.0F - pane.water2) * squared + pane.water2 * along * along;
+  const float root = std::sqrt(std::max(1e-12F, root2));
+  const float root_dot =
+      ((1.0F - pane.water2) * squared_dot + pane.water2 * along * along_dot) / root;
+  const float bend = root - pane.water * along;
+  const float bend_dot = root_dot - pane.water * along_dot;
+  *q = {pane.water * q->x + bend * pane.n[0], pane.water * q->y + bend * pane.n[1],
+        pane.water * q->z + bend * pane.n[2]};
+  *dq = {pane.water * dq->x + bend_dot * pane.n[0], pane.water * dq->y + bend_dot * pane.n[1],
+         pane.water * dq->z + bend_dot * pane.n[2]};
+  return std::min(along, root2 - 1e-4F * squared);
+}
+
 template <Distortion D>
 inline Moving distorted(const Intrinsics& c, Direction q, Direction dq) {
   if constexpr (D == Distortion::kEquidistant) return equidistant(c, q, dq);
@@ -130,8 +169,58 @@ void project_all(const Intrinsics c, const ScalePoints& points, float inverse_sc
   }
 }
 
+/// The same through a port: the direction is m + w (t + o - o'), where the left ray begins at o and
+/// the right one at o', which hardly depends on w.
+template <Distortion D>
+void project_through(const Pane pane, const Intrinsics c, const ScalePoints& points,
+                     float inverse_scale, ScaleProjections* out) {
+  const float* nl = points.normal;
+  const float* t = points.t;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(points.padded); ++i) {
+    const float w = points.inverse_depth[i] * inverse_scale;
+    const float o = points.ray_offset[i];
+    const Direction m = {points.mx[i], points.my[i], points.mz[i]};
+    const Direction begin = {t[0] + o * nl[0], t[1] + o * nl[1], t[2] + o * nl[2]};
+    float own = 0.0F;
+    for (int round = 0; round < 2; ++round) {
+      own = ray_offset(
+          pane, {m.x + w * (begin.x - own * pane.n[0]), m.y + w * (begin.y - own * pane.n[1]),
+                 m.z + w * (begin.z - own * pane.n[2])});
+    }
+    Direction dq = {-w * (begin.x - own * pane.n[0]), -w * (begin.y - own * pane.n[1]),
+                    -w * (begin.z - own * pane.n[2])};
+    Direction q = {m.x - dq.x, m.y - dq.y, m.z - dq.z};
+    const float margin = to_air(pane, &q, &dq);
+    const Moving p = distorted<D>(c, q, dq);
+    const float gone = p.away + away(margin);
+    out->x[i] = c.fx * p.x + c.cx + gone;
+    out->y[i] = c.fy * p.y + c.cy + gone;
+    out->jx[i] = c.fx * p.dx;
+    out->jy[i] = c.fy * p.dy;
+  }
+}
+
+Pane pane_of(const FlatPort& port) {
+  const auto f = [](double v) { return static_cast<float>(v); };
+  return {{f(port.normal.x()), f(port.normal.y()), f(port.normal.z())},
+          f(port.water),
+          f(port.water * port.water),
+          f(port.glass * port.glass),
+          f(port.distance),
+          f(port.thickness),
+          f(port.distance + port.thickness - port.centre)};
+}
+
+template <Distortion D>
+void project_camera(const CameraModel& camera, const Intrinsics& c, const ScalePoints& points,
+                    float inverse_scale, ScaleProjections* out) {
+  if (camera.port) return project_through<D>(pane_of(*camera.port), c, points, inverse_scale, out);
+  project_all<D>(c, points, inverse_scale, out);
+}
+
 /// Largest value below which the distorted radius still grows, found by the model's own verdict.
-float folding_limit(const CameraModel& camera) {
+float folding_limit(CameraModel camera) {
+  camera.port.reset();  // directions are of air by then
   if (camera.distortion == Distortion::kNone) return 0.0F;
   const bool fisheye = camera.distortion == Distortion::kEquidistant;
   const double step = 1e-3;
@@ -173,11 +262,11 @@ void RightProjection::project(const ScalePoints& points, double sigma, int level
   const auto inverse_scale = static_cast<float>(std::exp(-sigma));
   switch (camera_.distortion) {
     case Distortion::kRadtan:
-      return project_all<Distortion::kRadtan>(c, points, inverse_scale, out);
+      return project_camera<Distortion::kRadtan>(camera_, c, points, inverse_scale, out);
     case Distortion::kEquidistant:
-      return project_all<Distortion::kEquidistant>(c, points, inverse_scale, out);
+      return project_camera<Distortion::kEquidistant>(camera_, c, points, inverse_scale, out);
     case Distortion::kNone:
-      return project_all<Distortion::kNone>(c, points, inverse_scale, out);
+      return project_camera<Distortion::kNone>(camera_, c, points, inverse_scale, out);
   }
 }
 

@@ -12,9 +12,9 @@ namespace {
 
 constexpr std::array kArrays = {&ScalePoints::u,         &ScalePoints::v,
                                 &ScalePoints::mx,        &ScalePoints::my,
-                                &ScalePoints::mz,        &ScalePoints::inverse_depth,
-                                &ScalePoints::reference, &ScalePoints::relative_variance,
-                                &ScalePoints::visible};
+                                &ScalePoints::mz,        &ScalePoints::ray_offset,
+                                &ScalePoints::reference, &ScalePoints::inverse_depth,
+                                &ScalePoints::visible,   &ScalePoints::relative_variance};
 
 bool usable(const KeyframePoints& points, std::size_t i) {
   return points.inverse_depth[i] > 0.0F && std::isfinite(points.inverse_depth[i]) &&
@@ -40,6 +40,8 @@ void ScalePoints::prepare(const KeyframeSnapshot& keyframe, const StereoRig& rig
   const Mat3 turn = T_later_left.rotation_matrix();
   const Vec3 shift = T_later_left.translation();
   const CameraModel& camera = keyframe.camera;
+  const Vec3 pane = camera.port ? Vec3(r * (turn * camera.port->normal)) : Vec3(Vec3::Zero());
+  for (int i = 0; i < 3; ++i) normal[i] = static_cast<float>(pane[i]);
   std::size_t k = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!usable(points, i)) continue;
@@ -52,6 +54,7 @@ void ScalePoints::prepare(const KeyframeSnapshot& keyframe, const StereoRig& rig
     mx[k] = static_cast<float>(m.x());
     my[k] = static_cast<float>(m.y());
     mz[k] = static_cast<float>(m.z());
+    ray_offset[k] = camera.port ? static_cast<float>(camera.port->offset(Vec3(x, y, 1.0))) : 0.0F;
     inverse_depth[k] = points.inverse_depth[i];
     const float relative =
         std::max(points.sigma[i] / points.inverse_depth[i], static_cast<float>(min_relative_sigma));
@@ -67,6 +70,8 @@ void ScalePoints::turn_right(const Vec3& turn) {
   const Eigen::Matrix3f r = SO3::exp(turn).matrix().cast<float>();
   const Eigen::Vector3f translation = r * Eigen::Vector3f(t[0], t[1], t[2]);
   std::copy_n(translation.data(), 3, t);
+  const Eigen::Vector3f pane = r * Eigen::Vector3f(normal[0], normal[1], normal[2]);
+  std::copy_n(pane.data(), 3, normal);
   for (std::size_t i = 0; i < static_cast<std::size_t>(padded); ++i) {
     const Eigen::Vector3f m = r * Eigen::Vector3f(mx[i], my[i], mz[i]);
     mx[i] = m.x();
@@ -79,6 +84,7 @@ void ScalePoints::take_every(int stride, const ScalePoints& all) {
   size = all.size / stride;
   padded = padded_size(static_cast<std::size_t>(size));
   std::copy(all.t, all.t + 3, t);
+  std::copy(all.normal, all.normal + 3, normal);
   for (const auto array : kArrays) {
     const AlignedVector<float>& source = all.*array;
     AlignedVector<float>& target = this->*array;

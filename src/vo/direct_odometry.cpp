@@ -36,7 +36,7 @@ std::unique_ptr<Keyframe> new_keyframe(std::uint32_t id, const MonoFrame& frame,
   k->exposure_s = frame.exposure_s;
   k->pyramid = frame.pyramid;
   k->vignette = frame.vignette;
-  k->rows = frame.rows;
+  k->shift = frame.shift;
   k->velocity = frame.velocity;
   k->frozen_T_camera_world = T_world_camera.inverse();
   k->frozen_affine = affine;
@@ -155,7 +155,7 @@ MapResult DirectOdometry::map(const TrackedFrame& tracked, const KeyframeStereo&
   T_camera_reference.translation() *= std::exp(log_scale() - reference.log_scale);
   TrackedFrame found = tracked;
   const double rescaled = std::exp(log_scale() - reference.log_scale);
-  found.frame.rows.per_row *= rescaled;
+  found.frame.shift.per_row *= rescaled;
   if (!config_.motion_blur.enable) found.frame.velocity.reset();
   if (found.frame.velocity) found.frame.velocity->head<3>() *= rescaled;
   // How fast a map began tells its second frame.
@@ -192,7 +192,7 @@ void DirectOdometry::trace_all(const MonoFrame& frame, const SE3& T_world_camera
     HostGeometry geometry =
         host_geometry(camera_, T_camera_host,
                       brightness_transfer(host.affine, host.exposure_s, affine, frame.exposure_s));
-    geometry.rows = PairRowShift(T_camera_host, host.rows, frame.rows);
+    geometry.shift = PairViewShift(T_camera_host, host.shift, frame.shift);
     geometry.K = camera_.matrix().cast<float>();
     geometry.t = T_camera_host.translation().cast<float>();
     const int total = static_cast<int>(host.immature.size());

@@ -129,7 +129,7 @@ class DirectOdometry final : public MonocularBackend {
   /// is as turned: most of all straight on or back from the reference.
   TrackingResult search_ahead(const TrackingReference& reference, const MonoFrame& frame,
                               TrackingResult found);
-  TrackingReference as_seen(const TrackingReference& reference, const RowShift& rows,
+  TrackingReference as_seen(const TrackingReference& reference, const ViewShift& rows,
                             const SE3& T_current_reference) const;
   /// By how much a pose moves the reference's points, RMS [px of a VGA image].
   double flow_of(const SE3& T_current_reference, const TrackingReference& reference) const;

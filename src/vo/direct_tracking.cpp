@@ -158,7 +158,7 @@ TrackingResult DirectOdometry::track_likely(const TrackingReference& reference,
 /// leads to the right one, and what tells is how well the patterns around all points fit.
 TrackingResult DirectOdometry::search_ahead(const TrackingReference& reference,
                                             const MonoFrame& frame, TrackingResult found) {
-  const bool rolling = !reference.rows.none() || !frame.rows.none();
+  const bool rolling = !reference.shift.none() || !frame.shift.none();
   const ReferenceLevel patterns =
       rolling ? reference.levels[0]
               : with_patterns(reference.levels[0], reference.pyramid->level(0));
@@ -414,10 +414,11 @@ TrackedHistory DirectOdometry::compare_with_past(const TrackingReference& refere
 
 /// The reference as it will be seen where a frame should be: its rows at their instants, and
 /// without what is then behind things that move along with the camera.
-TrackingReference DirectOdometry::as_seen(const TrackingReference& reference, const RowShift& rows,
+TrackingReference DirectOdometry::as_seen(const TrackingReference& reference, const ViewShift& rows,
                                           const SE3& T_current_reference) const {
-  const bool rolling = !reference.rows.none() || !rows.none();
-  TrackingReference out = rolling ? moved_by_rows(reference, rows, T_current_reference) : reference;
+  const bool rolling = !reference.shift.none() || !rows.none();
+  TrackingReference out =
+      rolling ? moved_by_shift(reference, rows, T_current_reference) : reference;
   if (out.co_moving.empty()) return out;
   return without_hidden(out, ImageCells(config_.co_moving.cell, camera_.width, camera_.height),
                         out.co_moving, T_current_reference);
@@ -428,10 +429,10 @@ TrackedFrame DirectOdometry::track_hypotheses(const MonoFrame& frame,
   const TrackingReference& ref = *reference;
   TrackedFrame out;
   out.frame = frame;
-  const bool rolling = !ref.rows.none() || !frame.rows.none();
+  const bool rolling = !ref.shift.none() || !frame.shift.none();
   const TrackingResult tracking =
       rolling || !ref.co_moving.empty()
-          ? align_whole_or_rest(as_seen(ref, frame.rows, hypotheses_.front()), frame, &out.views)
+          ? align_whole_or_rest(as_seen(ref, frame.shift, hypotheses_.front()), frame, &out.views)
           : align_whole_or_rest(ref, frame, &out.views);
   out.tracking = static_cast<const FrameTracking&>(tracking);
   out.reference = std::move(reference);

@@ -245,13 +245,12 @@ bool make_immature_point(const ImageF& image, float u, float v, std::uint8_t typ
 
 namespace {
 
-/// With what the rows of a rolling shutter do to a point of this depth.
-HostGeometry moved_by_rows(const HostGeometry& g, const ImageF& image, const ImmaturePoint& p) {
+/// With what a rolling shutter or a port does to a point of this depth.
+HostGeometry moved_by_shift(const HostGeometry& g, const ImageF& image, const ImmaturePoint& p) {
   const float rho = std::isfinite(p.rho_max) ? 0.5F * (p.rho_min + p.rho_max) : p.rho_min;
   const Eigen::Vector3f seen = plain_product(g.KRKi, Eigen::Vector3f(p.u, p.v, 1.0F)) + g.Kt * rho;
-  const float row = seen.z() > 0.0F ? seen.y() / seen.z() : g.rows.middle();
   HostGeometry out = g;
-  const auto moved = g.rows.at(p.v, std::clamp(row, 0.0F, static_cast<float>(image.height())));
+  const auto moved = g.shift.at({p.u, p.v}, seen, image.width(), image.height());
   out.Kt = plain_product(g.K, moved.applied(g.t));
   return out;
 }
@@ -318,8 +317,8 @@ TraceState search(const ImageF& image, const HostGeometry& g, const PointConfig&
 TraceState trace(const ImageF& image, const HostGeometry& geometry, const PointConfig& config,
                  ImmaturePoint* point) {
   if (point->state == TraceState::kOutOfView) return point->state;
-  if (geometry.rows.none()) return search(image, geometry, config, point);
-  return search(image, moved_by_rows(geometry, image, *point), config, point);
+  if (geometry.shift.none()) return search(image, geometry, config, point);
+  return search(image, moved_by_shift(geometry, image, *point), config, point);
 }
 
 }  // namespace sovo

@@ -16,7 +16,7 @@ struct HostGeometry {
   Eigen::Matrix3f KRKi;
   Eigen::Vector3f Kt;
   float gain = 1.0F, bias = 0.0F;
-  PairRowShift rows;
+  PairViewShift shift;
   Eigen::Matrix3f K = Eigen::Matrix3f::Identity();
   Eigen::Vector3f t = Eigen::Vector3f::Zero();  ///< Kt is K times it.
 };

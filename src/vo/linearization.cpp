@@ -40,14 +40,14 @@ void geometric_jacobian(const CameraModel& camera, const PairGeometry& g,
   const float x = at.x;
   const float y = at.y;
   const float rho_target = at.rho * at.iz;
-  const Eigen::Vector3f t = g.rows.none() ? g.frozen_t : at.rows.applied(g.frozen_t);
+  const Eigen::Vector3f t = g.shift.none() ? g.frozen_t : at.shift.applied(g.frozen_t);
   r->du_rho = at.iz * (t.x() - t.z() * x) * fx;
   r->dv_rho = at.iz * (t.y() - t.z() * y) * fy;
   r->du = {rho_target * fx, 0.0F, -rho_target * x * fx, -x * y * fx, (1.0F + x * x) * fx, -y * fx};
   r->dv = {0.0F, rho_target * fy, -rho_target * y * fy, -(1.0F + y * y) * fy, x * y * fy, x * fy};
-  if (g.rows.none()) return;
+  if (g.shift.none()) return;
   for (auto* d : {&r->du, &r->dv}) {
-    const Eigen::Vector3f chained = at.rows.chain({(*d)[0], (*d)[1], (*d)[2]});
+    const Eigen::Vector3f chained = at.shift.chain({(*d)[0], (*d)[1], (*d)[2]});
     std::copy_n(chained.data(), 3, d->begin());
   }
 }
@@ -63,18 +63,17 @@ void fill_cross(LinearizedResidual* r) {
   r->cross[7] = r->gram[tri(0, 3)] * r->du_rho + r->gram[tri(1, 3)] * r->dv_rho;
 }
 
-/// By the row in which the point is seen; that it is seen in another row for this is less than a
+/// By the pixel in which the point is seen; that it is seen in another one for this is less than a
 /// thousandth of it.
-PairRowShift::Displacement row_shift(const PairGeometry& g, const Point& point,
-                                     const Eigen::Vector3f& seen, int height) {
-  const float row = seen.z() > 0.0F ? seen.y() / seen.z() : g.rows.middle();
-  return g.rows.at(point.v, std::clamp(row, 0.0F, static_cast<float>(height)));
+PairViewShift::Displacement view_shift(const PairGeometry& g, const Point& point,
+                                       const Eigen::Vector3f& seen, const ImageF& image) {
+  return g.shift.at({point.u, point.v}, seen, image.width(), image.height());
 }
 
 /// How far a pattern's pixels move in the target, not yet divided by z, for inverse depth.
 Eigen::Vector3f depth_motion(const CameraModel& camera, const PairGeometry& g,
-                             const PairRowShift::Displacement& rows) {
-  if (g.rows.none()) return g.Kt;
+                             const PairViewShift::Displacement& rows) {
+  if (g.shift.none()) return g.Kt;
   const Eigen::Matrix3f K = camera.matrix().cast<float>();
   return plain_product(K, rows.applied(g.t));
 }
@@ -151,7 +150,7 @@ bool sum_blurred_pattern(const Window& window, int host, int target,
   const ImageF& image = window[target].image();
   const float z = at.rho / at.centre_rho;
   const PairGeometry& g = window.pair(host, target);
-  const PatternWarp warp = pattern_warp(g, image, point, depth_motion(window.camera(), g, at.rows),
+  const PatternWarp warp = pattern_warp(g, image, point, depth_motion(window.camera(), g, at.shift),
                                         {at.centre_u * z, at.centre_v * z, z});
   if (!blur->known) *blur = pattern_blur(window, host, target, point, at, warp);
   if (!blur->in_host && blur->in_target.places == 1) return false;
@@ -181,11 +180,11 @@ void project_pattern(const Window& window, int host, int target, const Point& po
   const Eigen::Vector3f ray(point.u, point.v, 1.0F);
   const Eigen::Vector3f turned = plain_product(g.KRKi, ray);
   Eigen::Vector3f frozen_t = g.frozen_t;
-  if (!g.rows.none()) {
-    out.rows = row_shift(g, point, turned + g.Kt * out.rho, image.height());
-    frozen_t = out.rows.applied(g.frozen_t);
+  if (!g.shift.none()) {
+    out.shift = view_shift(g, point, turned + g.Kt * out.rho, image);
+    frozen_t = out.shift.applied(g.frozen_t);
   }
-  const Eigen::Vector3f Kt = depth_motion(window.camera(), g, out.rows);
+  const Eigen::Vector3f Kt = depth_motion(window.camera(), g, out.shift);
   const Eigen::Vector3f centre = turned + Kt * out.rho;
   const Eigen::Vector3f frozen = plain_product(g.frozen_RKi, ray) + frozen_t * out.rho;
   out.iz = 1.0F / frozen.z();

@@ -32,9 +32,9 @@ struct PatternProjection {
   alignas(32) std::array<float, kPatternSize> fx, fy;  ///< Position within its pixel.
   std::array<std::int32_t, kPatternSize> offset;       ///< Of that pixel in the image.
   float centre_u = 0.0F, centre_v = 0.0F, centre_rho = 0.0F;
-  float x = 0.0F, y = 0.0F;         ///< Centre in the normalized target image, poses frozen.
-  PairRowShift::Displacement rows;  ///< Of a rolling shutter: what it adds to the translation.
-  float iz = 0.0F, rho = 0.0F;      ///< z_host / z_target; inverse depth in the host [1/m].
+  float x = 0.0F, y = 0.0F;           ///< Centre in the normalized target image, poses frozen.
+  PairViewShift::Displacement shift;  ///< What is added to the translation.
+  float iz = 0.0F, rho = 0.0F;        ///< z_host / z_target; inverse depth in the host [1/m].
   bool in_view = false;
 };
 

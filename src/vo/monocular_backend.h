@@ -7,8 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "sovo/geometry/row_shift.h"
 #include "sovo/geometry/stereo_rig.h"
+#include "sovo/geometry/view_shift.h"
 #include "sovo/image/pyramid.h"
 #include "sovo/image/vignette.h"
 #include "sovo/vo/brightness.h"
@@ -28,7 +28,7 @@ struct MonoFrame {
   /// Of a rolling shutter: how the camera moved while the image was read out, log(T_later_earlier)
   /// a second (translation, rotation), as its images were prepared with. What it turned is undone.
   Vec6 rate = Vec6::Zero();
-  RowShift rows;  ///< Where points come to lie by the way that is left.
+  ViewShift shift;  ///< Where points come to lie by the way that is left, and by a port.
   /// How the camera moves at its instant, as log(T_later_earlier) a second (translation, rotation);
   /// nothing: not known.
   std::optional<Vec6> velocity;

@@ -283,7 +283,7 @@ TrackingReference build_tracking_reference(const Window& window, std::span<const
   ref.stamp_ns = newest.stamp_ns;
   ref.exposure_s = newest.exposure_s;
   ref.affine = newest.affine;
-  ref.rows = newest.rows;
+  ref.shift = newest.shift;
   ref.pyramid = newest.pyramid;
   ref.T_world_camera = newest.T_world_camera();
   ref.levels.resize(static_cast<std::size_t>(num_levels));
@@ -351,25 +351,29 @@ double threshold_share(const WeakTextureConfig& config, double gradient, double 
   return std::clamp(config.least_rms * rmse / cutoff, weak, 1.0);
 }
 
-TrackingReference moved_by_rows(const TrackingReference& reference, const RowShift& rows,
-                                const SE3& T_current_reference) {
+TrackingReference moved_by_shift(const TrackingReference& reference, const ViewShift& rows,
+                                 const SE3& T_current_reference) {
   TrackingReference out = reference;
-  const PairRowShift shift(T_current_reference, reference.rows, rows);
+  const PairViewShift shift(T_current_reference, reference.shift, rows);
   const Eigen::Matrix3f R = T_current_reference.rotation_matrix().cast<float>();
   const Eigen::Vector3f t = T_current_reference.translation().cast<float>();
+  const int whole_width = reference.levels[0].camera.width;
+  const int whole_height = reference.levels[0].camera.height;
   for (std::size_t l = 0; l < out.levels.size(); ++l) {
     ReferenceLevel& level = out.levels[l];
     const auto fx = static_cast<float>(level.camera.fx), fy = static_cast<float>(level.camera.fy);
     const auto cx = static_cast<float>(level.camera.cx), cy = static_cast<float>(level.camera.cy);
-    const auto height = static_cast<float>(level.camera.height);
     const int halvings = static_cast<int>(l);
     for (std::size_t i = 0; i < level.size(); ++i) {
-      const float row = level.v[i];
-      Eigen::Vector3f p((level.u[i] - cx) / fx, (row - cy) / fy, 1.0F);
+      const Eigen::Vector2f pixel(level.u[i], level.v[i]);
+      Eigen::Vector3f p((pixel.x() - cx) / fx, (pixel.y() - cy) / fy, 1.0F);
       const Eigen::Vector3f seen = R * p + level.rho[i] * t;
-      const float seen_row =
-          seen.z() > 0.0F ? std::clamp(fy * seen.y() / seen.z() + cy, 0.0F, height) : row;
-      const auto moved = shift.at(from_halved(row, halvings), from_halved(seen_row, halvings));
+      const auto whole = [halvings](float at) { return from_halved(at, halvings); };
+      const Eigen::Vector3f seen_at(whole(fx * seen.x() / seen.z() + cx),
+                                    whole(fy * seen.y() / seen.z() + cy),
+                                    seen.z() > 0.0F ? 1.0F : -1.0F);
+      const auto moved =
+          shift.at({whole(pixel.x()), whole(pixel.y())}, seen_at, whole_width, whole_height);
       p += level.rho[i] * (R.transpose() * (moved.applied(t) - t));
       if (!(p.z() > 0.0F)) continue;
       level.u[i] = fx * p.x() / p.z() + cx;
@@ -382,7 +386,7 @@ TrackingReference moved_by_rows(const TrackingReference& reference, const RowShi
 
 TrackingReference rescaled(const TrackingReference& reference, double scale) {
   TrackingReference out = reference;
-  out.rows.per_row *= scale;
+  out.shift.per_row *= scale;
   rescale(scale, &out);
   for (ReferenceLevel& level : out.levels) {
     for (float& rho : level.rho) rho /= static_cast<float>(scale);

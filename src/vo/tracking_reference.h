@@ -26,7 +26,7 @@ struct TrackingReference : ReferenceKeyframe {
   Affine affine;
   /// Of the last bundle adjustment: `PhotometricProblem::gradient_scatter`.
   double gradient_scatter = 1.0;
-  RowShift rows;            ///< Of its image.
+  ViewShift shift;          ///< Of its image.
   ImagePyramidPtr pyramid;  ///< Of the keyframe.
   std::vector<ReferenceLevel> levels;
   double threshold_share = 1.0;  ///< Of thresholds on brightness, see `WeakTextureConfig`.
@@ -72,8 +72,8 @@ double threshold_share(const WeakTextureConfig& config, double gradient, double 
 /// The reference as an image is compared with that was read out row after row: each point lies
 /// where it must for its own row in the reference's image, and for the one in which it is seen by
 /// `T_current_reference`.
-TrackingReference moved_by_rows(const TrackingReference& reference, const RowShift& rows,
-                                const SE3& T_current_reference);
+TrackingReference moved_by_shift(const TrackingReference& reference, const ViewShift& rows,
+                                 const SE3& T_current_reference);
 
 /// The same reference with all lengths multiplied by `scale`, the newest keyframe's centre fixed.
 TrackingReference rescaled(const TrackingReference& reference, double scale);

@@ -99,7 +99,7 @@ void Window::update_geometry() {
       g.frozen_RKi = (T0.rotation_matrix() * K_inverse).cast<float>();
       g.frozen_t = T0.translation().cast<float>();
 
-      g.rows = PairRowShift(T0, host.rows, target.rows);
+      g.shift = PairViewShift(T0, host.shift, target.shift);
 
       const BrightnessTransfer now =
           brightness_transfer(host.affine, host.exposure_s, target.affine, target.exposure_s);
@@ -186,7 +186,7 @@ void Window::apply_similarity(double scale) {
     SE3& T0 = k->frozen_T_camera_world;
     T0.translation() = scale * T0.translation() - (1.0 - scale) * (T0.rotation() * centre);
     k->set_x(s.asDiagonal() * k->x);
-    k->rows.per_row *= scale;
+    k->shift.per_row *= scale;
     if (k->velocity) k->velocity->head<3>() *= scale;
     k->exposed.head<3>() *= static_cast<float>(scale);
     for (Point& p : k->points) {

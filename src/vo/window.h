@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "sovo/geometry/camera_model.h"
-#include "sovo/geometry/row_shift.h"
 #include "sovo/geometry/se3.h"
 #include "sovo/geometry/stereo_rig.h"
+#include "sovo/geometry/view_shift.h"
 #include "sovo/image/pyramid.h"
 #include "sovo/image/vignette.h"
 #include "sovo/vo/brightness.h"
@@ -91,7 +91,7 @@ struct Keyframe {
   SE3 T_camera_world;  ///< exp(x) * frozen.
   Affine affine;       ///< frozen + x.
 
-  RowShift rows;                      ///< Of a rolling shutter, in the map's unit.
+  ViewShift shift;                    ///< Of a rolling shutter and a port, in the map's unit.
   std::optional<Vec6> velocity;       ///< MonoFrame::velocity, in the map's unit.
   Exposed exposed = Exposed::Zero();  ///< That, while its image was exposed.
   double longest_streak = 0.0;        ///< What that does to its image [px].
@@ -129,7 +129,7 @@ struct PairGeometry {
   float gain = 1.0F, bias = 0.0F;  ///< Current brightness transfer.
   float frozen_gain = 1.0F;
   float frozen_host_b = 0.0F;
-  PairRowShift rows;      ///< By the linearization points.
+  PairViewShift shift;    ///< By the linearization points.
   Mat8 adjoint_host;      ///< d (relative state) / d x_host; that of x_target is the identity.
   double distance = 0.0;  ///< Between the camera centres [m].
   bool blurred = false;   ///< Motion blur is to be seen in one of both, and known of both.

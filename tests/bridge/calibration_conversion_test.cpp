@@ -39,6 +39,56 @@ TEST(CalibrationConversion, ThereAndBack) {
   EXPECT_TRUE(back->right_photometric.empty());
 }
 
+/// The same cameras behind ports.
+StereoCameras submerged_cameras() {
+  StereoCameras cameras = test_cameras();
+  const Vec3 normal = Vec3(0.01, 0.02, 1.0).normalized();
+  cameras.rig.left.port = {.distance = 0.02, .thickness = 0.008, .normal = normal, .centre = -0.01};
+  cameras.rig.right.port = {.distance = 0.03, .glass = 1.52, .water = 1.34};
+  return cameras;
+}
+
+TEST(CalibrationConversion, PortsThereAndBack) {
+  const StereoCameras cameras = submerged_cameras();
+  const CalibrationMessage message(cameras, "left_frame", 5);
+  EXPECT_STREQ(message.message().left.model, "pinhole_flat_port");
+  const auto back = from_message(message.message());
+  ASSERT_TRUE(back.ok()) << back.error();
+  for (const auto& [a, b] : {std::pair(&cameras.rig.left, &back->rig.left),
+                             std::pair(&cameras.rig.right, &back->rig.right)}) {
+    EXPECT_EQ(a->d, b->d);
+    EXPECT_EQ(a->num_coefficients, b->num_coefficients);
+    ASSERT_TRUE(b->port);
+    EXPECT_EQ(a->port->distance, b->port->distance);
+    EXPECT_EQ(a->port->thickness, b->port->thickness);
+    EXPECT_EQ(a->port->glass, b->port->glass);
+    EXPECT_EQ(a->port->water, b->port->water);
+    EXPECT_EQ(a->port->normal, b->port->normal);
+    EXPECT_EQ(a->port->centre, b->port->centre);
+  }
+}
+
+TEST(CalibrationConversion, PortsThatCannotBeAreRefused) {
+  using M = msg::StereoCalibration;
+  const std::vector<std::function<void(M&)>> cases = {
+      [](M& m) { m.left.d._buffer[m.left.d._length - 8] = -0.02; },
+      [](M& m) { m.left.d._buffer[m.left.d._length - 5] = 3.0; },
+      [](M& m) { m.left.d._buffer[m.left.d._length - 2] = 0.0; },
+      [](M& m) { m.left.d._buffer[m.left.d._length - 1] = 5.0; },
+      [](M& m) { m.left.d._length -= 1; },
+      [](M& m) { m.left.d._length = 7; },
+      [](M& m) { m.left.model = borrow("pinhole"); },
+  };
+  for (const auto& spoil : cases) {
+    const CalibrationMessage original(submerged_cameras(), "left", 0);
+    M message = original.message();
+    spoil(message);
+    const auto result = from_message(message);
+    ASSERT_FALSE(result.ok()) << &spoil - cases.data();
+    EXPECT_NE(result.error().find("left.d"), std::string::npos) << result.error();
+  }
+}
+
 TEST(CalibrationConversion, MalformedMessagesAreRefusedByField) {
   using M = msg::StereoCalibration;
   const std::vector<std::pair<std::string, std::function<void(M&)>>> cases = {

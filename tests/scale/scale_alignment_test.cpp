@@ -58,6 +58,53 @@ TEST_P(ProjectionTest, AgreesWithTheCameraModelAndItsDerivative) {
   }
 }
 
+TEST_P(ProjectionTest, BehindPortsAgreesWithTheCameraModelsAndItsDerivative) {
+  StereoRig rig = test::make_rig(GetParam());
+  rig.left.port = {.distance = 0.06, .thickness = 0.02, .normal = Vec3(0.02, 0.03, 1).normalized()};
+  rig.right.port = {.distance = 0.05, .thickness = 0.02, .normal = Vec3(-0.03, 0, 1).normalized()};
+  for (CameraModel* camera : {&rig.left, &rig.right}) {
+    camera->port->centre = *centre_behind_port(*camera);
+  }
+  CameraModel tracked = rig.left;
+  tracked.distortion = Distortion::kNone;
+  tracked.straightened = true;
+  const auto keyframe = random_keyframe(tracked, 203);
+  ScalePoints points;
+  points.prepare(keyframe, rig, SE3(), 0.01);
+  ScaleProjections found;
+  for (const int level : {0, 2}) {
+    const double sigma = 0.3;
+    RightProjection(rig.right).project(points, sigma, level, &found);
+    const CameraModel right = rig.right.at_level(level);
+    int compared = 0;
+    double most = 0.0;
+    for (std::size_t i = 0; i < keyframe.points.size(); ++i) {
+      const double depth = 1.0 / static_cast<double>(keyframe.points.inverse_depth[i]);
+      const Vec2 pixel(static_cast<double>(keyframe.points.u[i]),
+                       static_cast<double>(keyframe.points.v[i]));
+      const Vec3 ray = *tracked.unproject(pixel) / tracked.unproject(pixel)->z();
+      const auto point_at = [&](double s) {
+        return Vec3(rig.T_right_left * (tracked.ray_offset(ray) + std::exp(s) * depth * ray));
+      };
+      const auto at = [&](double s) { return right.project(right.direction_of(point_at(s))); };
+      const auto here = at(sigma);
+      if (!here || !right.contains(*here)) continue;
+      const double h = 1e-5;
+      const Vec2 slope = (*at(sigma + h) - *at(sigma - h)) / (2.0 * h);
+      EXPECT_NEAR(found.x[i], here->x(), 5e-3);
+      EXPECT_NEAR(found.y[i], here->y(), 5e-3);
+      // That the right ray passes elsewhere when the scale changes is left out.
+      EXPECT_NEAR(found.jx[i], slope.x(), 0.02 * slope.norm());
+      EXPECT_NEAR(found.jy[i], slope.y(), 0.02 * slope.norm());
+      const auto central = right.project(rig.T_right_left * Vec3(std::exp(sigma) * depth * ray));
+      if (central) most = std::max(most, (*central - *here).norm());
+      ++compared;
+    }
+    EXPECT_GT(compared, 80);
+    EXPECT_GT(most, level == 0 ? 0.4 : 0.1) << "or the ports do nothing";
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Cameras, ProjectionTest,
                          testing::Values(Right::kRectified, Right::kRadtan, Right::kEquidistant));
 

@@ -121,11 +121,14 @@ class SyntheticScene {
     return {best, nearest->texture(nearest->s.dot(at), nearest->t.dot(at))};
   }
 
-  /// z of the surface that a pixel sees, in the camera frame [m]; 0 where the camera has no ray.
+  /// z of the surface that a pixel sees, in the camera frame [m]; through a port, too; 0 where the
+  /// camera has no ray.
   double depth(const CameraModel& camera, const SE3& T_world_camera, const Vec2& pixel) const {
     const auto ray = camera.unproject(pixel);
     if (!ray) return 0.0;
-    return cast(T_world_camera.translation(), T_world_camera.rotation() * *ray).distance * ray->z();
+    const Vec3 offset = camera.ray_offset(*ray);
+    const Hit hit = cast(T_world_camera * offset, T_world_camera.rotation() * *ray);
+    return offset.z() + hit.distance * ray->z();
   }
 
   /// What the camera sees, one ray a pixel centre, without noise; 0 where it has no ray. `depth`
@@ -137,11 +140,12 @@ class SyntheticScene {
     for (int y = 0; y < camera.height; ++y) {
       for (int x = 0; x < camera.width; ++x) {
         const auto ray = camera.unproject(Vec2(x, y));
+        const Vec3 offset = ray ? camera.ray_offset(*ray) : Vec3(Vec3::Zero());
         const Hit hit =
-            ray ? cast(T_world_camera.translation(), T_world_camera.rotation() * *ray) : Hit{};
+            ray ? cast(T_world_camera * offset, T_world_camera.rotation() * *ray) : Hit{};
         image.at(x, y) = static_cast<float>(hit.value);
         if (depth != nullptr) {
-          depth->at(x, y) = ray ? static_cast<float>(hit.distance * ray->z()) : 0.0F;
+          depth->at(x, y) = ray ? static_cast<float>(offset.z() + hit.distance * ray->z()) : 0.0F;
         }
       }
     }

@@ -451,10 +451,10 @@ TEST(TrackingReferenceOfARollingShutter, ShowsEachPointWhereItsRowsDo) {
   const SyntheticScene scene(5);
   TrackingReference reference = scene_reference(scene);
   const double middle = 0.5 * (small_camera().height - 1);
-  reference.rows = {.per_row = Vec3(2e-4, 1e-4, -5e-4), .middle = middle};
-  const RowShift rows{.per_row = Vec3(-1e-4, 2e-4, -6e-4), .middle = middle};
+  reference.shift = {.per_row = Vec3(2e-4, 1e-4, -5e-4), .middle = middle};
+  const ViewShift rows{.per_row = Vec3(-1e-4, 2e-4, -6e-4), .middle = middle};
   const SE3 T(SO3::exp(Vec3(0.01, -0.02, 0.015)), Vec3(0.05, -0.02, -0.2));
-  const TrackingReference moved = moved_by_rows(reference, rows, T);
+  const TrackingReference moved = moved_by_shift(reference, rows, T);
   for (std::size_t l = 0; l < 2; ++l) {
     const ReferenceLevel& level = reference.levels[l];
     const CameraModel& camera = level.camera;
@@ -467,9 +467,9 @@ TEST(TrackingReferenceOfARollingShutter, ShowsEachPointWhereItsRowsDo) {
                static_cast<double>(of.rho[i]);
       };
       // At the reference's instant, at the image's, and in the row that shows it.
-      const Vec3 in_image = T * (point(level) - reference.rows.at(row(level.v[i])));
+      const Vec3 in_image = T * (point(level) - reference.shift.at(0.0, row(level.v[i])));
       Vec2 seen = *camera.project(in_image);
-      for (int k = 0; k < 3; ++k) seen = *camera.project(in_image + rows.at(row(seen.y())));
+      for (int k = 0; k < 3; ++k) seen = *camera.project(in_image + rows.at(0.0, row(seen.y())));
       const Vec2 found = *camera.project(T * point(moved.levels[l]));
       const double displacement = (seen - *camera.project(T * point(level))).norm();
       // By one instant it is seen some rows from where it is seen: by so much the less, or more, it

@@ -50,9 +50,9 @@ class WindowJacobian : public ::testing::Test {
                   window_[0].frozen_T_camera_world.inverse();
     const Vec3 ray((u - c.cx) / c.fx, (v - c.cy) / c.fy, 1.0);
     const Vec3& moved = T.translation();
-    const Vec3 t = (1.0 + rows_.share) * moved +
-                   rows_.along.cast<double>().dot(moved) * rows_.across.cast<double>() +
-                   rows_.fixed.cast<double>();
+    const Vec3 t = (1.0 + shift_.share) * moved +
+                   shift_.along.cast<double>().dot(moved) * shift_.across.cast<double>() +
+                   shift_.fixed.cast<double>();
     const Vec3 p = T.rotation_matrix() * ray + t * state[8];
     return {c.fx * p.x() / p.z() + c.cx, c.fy * p.y() / p.z() + c.cy};
   }
@@ -137,15 +137,46 @@ class WindowJacobian : public ::testing::Test {
   /// The images are read out row after row while the camera moves on.
   void roll() {
     const double middle = 0.5 * (window_.camera().height - 1);
-    window_[0].rows = {.per_row = Vec3(2e-4, 1e-4, 5e-4), .middle = middle};
-    window_[1].rows = {.per_row = Vec3(-1e-4, 2e-4, 6e-4), .middle = middle};
+    window_[0].shift = {.per_row = Vec3(2e-4, 1e-4, 5e-4), .middle = middle};
+    window_[1].shift = {.per_row = Vec3(-1e-4, 2e-4, 6e-4), .middle = middle};
     window_.update_geometry();
     const Vec2 seen = project(point().u, point().v, here());
-    rows_ = window_.pair(0, 1).rows.at(point().v, static_cast<float>(seen.y()));
+    shift_ = window_.pair(0, 1).shift.at({point().u, point().v}, seen.cast<float>());
+  }
+
+  /// The camera is behind a port.
+  void dive() {
+    const CameraModel& c = window_.camera();
+    const FlatPort port{.distance = 0.3, .thickness = 0.05, .normal = {0.02, 0.01, 0.9997}};
+    window_[0].shift.axial = window_[1].shift.axial = AxialRays{port, c.fx, c.fy, c.cx, c.cy};
+    window_.update_geometry();
+    const Vec2 seen = project(point().u, point().v, here());
+    shift_ = window_.pair(0, 1).shift.at({point().u, point().v}, seen.cast<float>());
+  }
+
+  /// Where the point is seen and how that changes are what central differences say.
+  void expect_shifted_geometry() {
+    linearize_now();
+    const auto f = [&](const Vec9& s) { return project(point().u, point().v, s); };
+    const Eigen::Matrix<double, 2, 9> J = central_differences<2, 9>(f, here());
+    const LinearizedResidual& r = linearized_;
+    // A target that turns takes what is added along or leaves it: that is not told apart.
+    const double added = double{shift_.across.norm()} + double{shift_.fixed.norm()};
+    const double turned = window_.camera().fx * point().rho * added;
+    for (std::size_t k = 0; k < 6; ++k) {
+      const auto c = static_cast<Eigen::Index>(k);
+      const double tolerance = 3e-4 * J.col(c).norm() + (k < 3 ? 0.0 : turned);
+      EXPECT_NEAR(r.du[k], J(0, c), tolerance) << "state " << k;
+      EXPECT_NEAR(r.dv[k], J(1, c), tolerance) << "state " << k;
+    }
+    EXPECT_NEAR(r.du_rho, J(0, 8), 3e-4 * J.col(8).norm());
+    EXPECT_NEAR(r.dv_rho, J(1, 8), 3e-4 * J.col(8).norm());
+    EXPECT_NEAR(r.centre_u, f(here()).x(), 1e-2);
+    EXPECT_NEAR(r.centre_v, f(here()).y(), 1e-2);
   }
 
   WaveImage image_{0.5};
-  PairRowShift::Displacement rows_;
+  PairViewShift::Displacement shift_;
   WindowConfig config_;
   Window window_;
   LinearizedResidual linearized_;
@@ -196,23 +227,24 @@ TEST_F(WindowJacobian, GeometryAgreesWithCentralDifferencesAtTheCentrePixel) {
 TEST_F(WindowJacobian, GeometryOfARollingShutterAgreesWithCentralDifferences) {
   const Vec2 at_once = project(point().u, point().v, here());
   roll();
-  linearize_now();
-  const auto f = [&](const Vec9& s) { return project(point().u, point().v, s); };
-  EXPECT_GT((f(here()) - at_once).norm(), 0.5) << "or the rows do nothing";
-  const Eigen::Matrix<double, 2, 9> J = central_differences<2, 9>(f, here());
-  const LinearizedResidual& r = linearized_;
-  // A target that turns takes the part across along or leaves it: that is not told apart.
-  const double turned = window_.camera().fx * point().rho * rows_.across.norm();
-  for (std::size_t k = 0; k < 6; ++k) {
-    const auto c = static_cast<Eigen::Index>(k);
-    const double tolerance = 3e-4 * J.col(c).norm() + (k < 3 ? 0.0 : turned);
-    EXPECT_NEAR(r.du[k], J(0, c), tolerance) << "state " << k;
-    EXPECT_NEAR(r.dv[k], J(1, c), tolerance) << "state " << k;
-  }
-  EXPECT_NEAR(r.du_rho, J(0, 8), 3e-4 * J.col(8).norm());
-  EXPECT_NEAR(r.dv_rho, J(1, 8), 3e-4 * J.col(8).norm());
-  EXPECT_NEAR(r.centre_u, f(here()).x(), 1e-2);
-  EXPECT_NEAR(r.centre_v, f(here()).y(), 1e-2);
+  EXPECT_GT((project(point().u, point().v, here()) - at_once).norm(), 0.5)
+      << "or the rows do nothing";
+  expect_shifted_geometry();
+}
+
+TEST_F(WindowJacobian, GeometryBehindAPortAgreesWithCentralDifferences) {
+  const Vec2 central = project(point().u, point().v, here());
+  dive();
+  EXPECT_GT((project(point().u, point().v, here()) - central).norm(), 0.5)
+      << "or the port does nothing";
+  expect_shifted_geometry();
+}
+
+TEST_F(WindowJacobian, APortStaysInMetres) {
+  dive();
+  const Vec3 offset = window_[0].shift.at(double{point().u}, double{point().v});
+  window_.apply_similarity(1.9);
+  EXPECT_EQ(window_[0].shift.at(double{point().u}, double{point().v}), offset);
 }
 
 TEST_F(WindowJacobian, RowsGrowWithTheMap) {

@@ -13,14 +13,19 @@ RayTable::RayTable(const CameraModel& camera)
   const std::size_t count = offset(num_tiles());
   for (auto* values : {&dx_, &dy_, &dz_, &angle_}) values->assign(count, 0.0F);
   for (auto& values : steps_) values.assign(count, 0.0F);
+  if (bends()) {
+    direction_.assign(count, Eigen::Vector3f::Zero());
+    offset_.assign(count, 0.0F);
+  }
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
       const auto ray = camera.unproject({x, y});
       if (!ray) continue;
       const std::size_t i = index(x, y);
-      dx_[i] = static_cast<float>(ray->x());
-      dy_[i] = static_cast<float>(ray->y());
-      dz_[i] = static_cast<float>(ray->z());
+      store_ray(i, ray->cast<float>());
+      if (!bends()) continue;
+      direction_[i] = ray->cast<float>();
+      offset_[i] = static_cast<float>(camera.port->offset(*ray));
     }
   }
   for (int y = 0; y < camera.height; ++y) {
@@ -37,6 +42,31 @@ RayTable::RayTable(const CameraModel& camera)
   for (int b = 0; b < blocks_x() * blocks_y(); ++b) {
     blocks_.push_back(
         cone_of(b % blocks_x() * kBlockSide, b / blocks_x() * kBlockSide, kBlockSide));
+  }
+}
+
+void RayTable::store_ray(std::size_t i, const Eigen::Vector3f& ray) {
+  dx_[i] = ray.x();
+  dy_[i] = ray.y();
+  dz_[i] = ray.z();
+}
+
+/// Through the place on the true ray that is at that range.
+void RayTable::bend(int tile_row, const float* range) {
+  const Eigen::Vector3f normal = camera_.port->normal.cast<float>();
+  const std::size_t end = offset((tile_row + 1) * tiles_x_);
+  for (std::size_t i = offset(tile_row * tiles_x_); i < end; ++i) {
+    const Eigen::Vector3f& direction = direction_[i];
+    if (direction.isZero()) continue;
+    if (range == nullptr || !std::isfinite(range[i])) {
+      store_ray(i, direction);
+      continue;
+    }
+    const Eigen::Vector3f begin = offset_[i] * normal;
+    const float along = begin.dot(direction);
+    const float aside2 = begin.squaredNorm() - along * along;
+    const float length = std::sqrt(std::max(0.0F, range[i] * range[i] - aside2)) - along;
+    store_ray(i, (begin + length * direction).normalized());
   }
 }
 
@@ -94,8 +124,9 @@ RayCone RayTable::cone_of(int x0, int y0, int side) const {
       pixel = std::max(pixel, double{angle_[index(x, y)]});
     }
   }
-  // Rays through a pixel's corners belong to it.
-  const double angle = std::min(3.14, widest + 2.0 * pixel + 1e-4);
+  // Rays through a pixel's corners belong to it, and those that a port bends for near things.
+  constexpr double kBent = 0.1;
+  const double angle = std::min(3.14, widest + 2.0 * pixel + (bends() ? kBent : 1e-4));
   for (int i = 0; i < 3; ++i) cone.axis[i] = static_cast<float>(axis[i]);
   cone.cos_angle = static_cast<float>(std::cos(angle));
   cone.sin_angle = static_cast<float>(std::sin(angle));

@@ -47,6 +47,13 @@ class RayTable {
   int blocks_x() const { return (tiles_x_ + kBlock - 1) / kBlock; }
   int blocks_y() const { return (tiles_y_ + kBlock - 1) / kBlock; }
 
+  /// Whether rays depend on how far away things are, for the camera is behind a port.
+  bool bends() const { return camera_.port.has_value(); }
+  /// Lets the rays of a row of tiles meet what lies `range` from the camera's origin, which is
+  /// given in the order of the arrays from tile 0 on [m]; null: infinitely far. Precondition:
+  /// `bends`.
+  void bend(int tile_row, const float* range);
+
   /// Place of pixel (x, y) in the arrays that begin at tile 0.
   std::size_t index(int x, int y) const {
     const int tile = (y / kTile) * tiles_x_ + x / kTile;
@@ -64,6 +71,7 @@ class RayTable {
   Eigen::Vector3f ray_step_y(int x, int y) const;
 
  private:
+  void store_ray(std::size_t i, const Eigen::Vector3f& ray);
   static std::size_t offset(int tile) { return static_cast<std::size_t>(tile) * kTilePixels; }
   void store_pixel_step(int x, int y);
   RayCone cone_of(int x0, int y0, int side) const;
@@ -72,6 +80,9 @@ class RayTable {
   int tiles_x_;
   int tiles_y_;
   AlignedVector<float> dx_, dy_, dz_, angle_;
+  /// Behind a port: directions of rays, and how far from the origin they pass the port's normal.
+  std::vector<Eigen::Vector3f> direction_;
+  std::vector<float> offset_;
   std::array<AlignedVector<float>, 6> steps_;
   std::vector<RayCone> cones_;
   std::vector<RayCone> blocks_;

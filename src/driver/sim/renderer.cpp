@@ -88,6 +88,15 @@ void Renderer::render_band(const View& view, const Band& band, RenderedImage* im
 void Renderer::find_surfaces(const Band& band) {
   const int first = std::max(0, band.begin - 1) / RayTable::kTile;
   const int last = std::min(rays_.camera().height - 1, band.end) / RayTable::kTile;
+  for (int row = first; rays_.bends() && row <= last; ++row) rays_.bend(row, nullptr);
+  find_in_tile_rows(first, last);
+  if (!rays_.bends()) return;
+  // How far away things are tells how rays run, which changes hardly how far away they are.
+  for (int row = first; row <= last; ++row) rays_.bend(row, range_.data());
+  find_in_tile_rows(first, last);
+}
+
+void Renderer::find_in_tile_rows(int first, int last) {
   const auto begin = first * rays_.tiles_x() * RayTable::kTilePixels;
   const auto end = (last + 1) * rays_.tiles_x() * RayTable::kTilePixels;
   std::fill(range_.begin() + begin, range_.begin() + end, kInfinity);
@@ -239,7 +248,7 @@ void Renderer::draw_particles(const View& view, const Band& band, RenderedImage*
     const double size = random.uniform(0.4, 1.0);
     const double distance = offset.norm();
     const Vec3 in_camera = T_camera_world.rotation() * offset;
-    const auto pixel = camera.project(in_camera);
+    const auto pixel = camera.project(camera.direction_of(in_camera));
     if (!pixel || !camera.contains(*pixel) || distance < 0.15) continue;
     const int cx = static_cast<int>(std::lround(pixel->x()));
     const int cy = static_cast<int>(std::lround(pixel->y()));

@@ -59,6 +59,7 @@ class Renderer {
   };
   void render_band(const View& view, const Band& band, RenderedImage* image);
   void find_surfaces(const Band& band);
+  void find_in_tile_rows(int first, int last);
   void find_in_block_row(int by, int first_tile_row, int last_tile_row);
   void find_in_tile(int tile);
   void shade_tile(int tile, const Band& band, RenderedImage* image);

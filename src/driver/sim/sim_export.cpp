@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <utility>
 
+#include "sovo/geometry/radtan_fit.h"
 #include "sovo/io/image_file.h"
 #include "sovo/io/text.h"
 
@@ -126,6 +127,17 @@ class DepthTable {
   std::string text_ = "#timestamp [ns],u [px],v [px],depth [m]\n";
 };
 
+/// EuRoC's files know no ports: ours, beside them, comes first.
+Result<void> write_with_ports(const fs::path& root, const Calibration& c) {
+  PhotometricFiles files;
+  if (!c.left_photometric.inverse_response.empty()) files.left_response = "dso/cam0/pcalib.txt";
+  if (!c.left_photometric.vignette.empty()) files.left_vignette = "dso/cam0/vignette.png";
+  if (!c.right_photometric.inverse_response.empty()) files.right_response = "dso/cam1/pcalib.txt";
+  if (!c.right_photometric.vignette.empty()) files.right_vignette = "dso/cam1/vignette.png";
+  return write_text_file((root / "calibration.yaml").string(),
+                         format_sovo_calibration(c.rig, files));
+}
+
 }  // namespace
 
 Result<void> write_pfm(const std::string& path, const ImageF& image) {
@@ -145,13 +157,16 @@ Result<void> export_dataset(SimSource* source, const std::string& directory, boo
                             const std::function<bool(std::size_t)>& progress) {
   const fs::path root(directory);
   const Calibration& c = source->calibration();
-  const StereoRig& rig = c.rig;
+  const StereoRig rig = without_ports(c.rig);
   CameraFiles left(root, "cam0");
   CameraFiles right(root, "cam1");
   const SE3 T_body_right = rig.T_base_left * rig.T_right_left.inverse();
   const double rate = source->frame_rate();
   if (auto ok = left.begin(rig.left, rig.T_base_left, rate, c.left_photometric); !ok) return ok;
   if (auto ok = right.begin(rig.right, T_body_right, rate, c.right_photometric); !ok) return ok;
+  if (c.rig.left.port || c.rig.right.port) {
+    if (auto ok = write_with_ports(root, c); !ok) return ok;
+  }
   if (depth) fs::create_directories(root / "depth");
   Trajectory truth;
   DepthTable table(rig.left.width, rig.left.height);

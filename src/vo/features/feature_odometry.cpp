@@ -141,7 +141,7 @@ void FeatureOdometry::add_landmark(const SelectedPixel& pixel, const DepthPropos
   l.v = static_cast<float>(pixel.y);
   const bool known = depth.sigma > 0.0F && depth.rho > 0.0F;
   double rho = known ? static_cast<double>(depth.rho) : window_.mean_inverse_depth();
-  l.ray = ray_at_instant(camera_, host.rows, l.u, l.v, &rho);
+  l.ray = ray_at_instant(camera_, host.shift, l.u, l.v, &rho);
   AlignmentPatch patch;
   if (!make_patch(host.pyramid->level(0), l.u, l.v, kNoWarp, &patch)) return;
   l.id = next_landmark_++;
@@ -164,7 +164,7 @@ void FeatureOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
   last_pyramid_ = frame.pyramid;
   next_keyframe_ = 0;
   window_.keyframes.push_back(
-      {next_keyframe_++, frame.stamp_ns, frame.pyramid, T_world_camera.inverse(), frame.rows});
+      {next_keyframe_++, frame.stamp_ns, frame.pyramid, T_world_camera.inverse(), frame.shift});
   // What begins a map need not be corners, nor apart: two views give all kinds of pixels.
   std::vector<StartPoint> best = points;
   const ImageF response = corner_response(frame.pyramid->level(0));
@@ -227,8 +227,8 @@ MapResult FeatureOdometry::map(const TrackedFrame& tracked, const KeyframeStereo
 void FeatureOdometry::insert_keyframe(const TrackedFrame& tracked, const SE3& T_world_camera) {
   const MonoFrame& frame = tracked.frame;
   window_.keyframes.push_back(
-      {next_keyframe_++, frame.stamp_ns, frame.pyramid, T_world_camera.inverse(), frame.rows});
-  window_.keyframes.back().rows.per_row *= std::exp(log_scale() - tracked.reference->log_scale);
+      {next_keyframe_++, frame.stamp_ns, frame.pyramid, T_world_camera.inverse(), frame.shift});
+  window_.keyframes.back().shift.per_row *= std::exp(log_scale() - tracked.reference->log_scale);
   const auto& views = static_cast<const FeatureViewList&>(*tracked.views).views;
   // Both are in the order of the landmarks' ids.
   auto landmark = window_.landmarks.begin();
@@ -357,7 +357,7 @@ void FeatureOdometry::take_snapshot() {
       continue;
     }
     double rho = l.rho * p.depth_ratio;
-    const Vec2 pixel = seen_by_row(camera_, newest.rows, p.pixel, &rho);
+    const Vec2 pixel = seen_by_shift(camera_, newest.shift, p.pixel, &rho);
     s.points.u.push_back(static_cast<float>(pixel.x()));
     s.points.v.push_back(static_cast<float>(pixel.y()));
     s.points.inverse_depth.push_back(static_cast<float>(rho));

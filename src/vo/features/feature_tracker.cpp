@@ -37,7 +37,7 @@ std::vector<PatchMatch> FeatureTracker::follow(const FeatureReference& reference
       const SE3 T = T_current_reference * f.T_reference_host;
       Vec2 pixel;
       if (!reproject(camera_, T, f.ray, f.rho, &pixel)) continue;
-      const Vec2 by_row = row_displacement(frame.rows, T, f, pixel);
+      const Vec2 by_row = shift_displacement(frame.shift, T, f, pixel);
       pixel += by_row;
       if (!camera_.contains(pixel)) continue;
       const Mat2 A = surroundings(camera_, T, f.ray, f.rho);
@@ -54,14 +54,14 @@ std::vector<PatchMatch> FeatureTracker::follow(const FeatureReference& reference
   return matches;
 }
 
-/// Of a rolling shutter: from where a landmark is at a frame's instant to where it is seen.
-Vec2 FeatureTracker::row_displacement(const RowShift& rows, const SE3& T_current_host,
-                                      const ReferenceFeature& feature, const Vec2& pixel) const {
-  if (rows.none()) return Vec2::Zero();
+/// From where a landmark is at a frame's instant, by its centre, to where it is seen.
+Vec2 FeatureTracker::shift_displacement(const ViewShift& shift, const SE3& T_current_host,
+                                        const ReferenceFeature& feature, const Vec2& pixel) const {
+  if (shift.none()) return Vec2::Zero();
   const Vec3 q =
       T_current_host.rotation() * feature.ray + feature.rho * T_current_host.translation();
   double rho = feature.rho / q.z();
-  return seen_by_row(camera_, rows, pixel, &rho) - pixel;
+  return seen_by_shift(camera_, shift, pixel, &rho) - pixel;
 }
 
 FeaturePose FeatureTracker::pose_of(const FeatureReference& reference,

@@ -74,8 +74,8 @@ class FeatureTracker {
   std::vector<PatchMatch> follow(const FeatureReference& reference, const MonoFrame& frame,
                                  const SE3& T_current_reference, const std::vector<bool>& wanted,
                                  int levels) const;
-  Vec2 row_displacement(const RowShift& rows, const SE3& T_current_host,
-                        const ReferenceFeature& feature, const Vec2& pixel) const;
+  Vec2 shift_displacement(const ViewShift& rows, const SE3& T_current_host,
+                          const ReferenceFeature& feature, const Vec2& pixel) const;
   FeaturePose pose_of(const FeatureReference& reference, const std::vector<PatchMatch>& matches,
                       const SE3& start) const;
   bool is_in_view(const SE3& T_current_reference, const ReferenceFeature& feature) const;

@@ -68,7 +68,7 @@ void FeatureWindow::apply_similarity(double scale) {
     SE3 T_world_camera = k.T_camera_world.inverse();
     T_world_camera.translation() = centre + scale * (T_world_camera.translation() - centre);
     k.T_camera_world = T_world_camera.inverse();
-    k.rows.per_row *= scale;
+    k.shift.per_row *= scale;
   }
   for (FeatureLandmark& l : landmarks) {
     l.rho /= scale;

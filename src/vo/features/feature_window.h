@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "sovo/geometry/camera_model.h"
-#include "sovo/geometry/row_shift.h"
 #include "sovo/geometry/se3.h"
+#include "sovo/geometry/view_shift.h"
 #include "sovo/image/pyramid.h"
 #include "sovo/vo/keyframe_poses.h"
 
@@ -47,7 +47,7 @@ struct FeatureKeyframe {
   std::int64_t stamp_ns = 0;
   ImagePyramidPtr pyramid;
   SE3 T_camera_world;
-  RowShift rows;  ///< Of a rolling shutter.
+  ViewShift shift;  ///< Of a rolling shutter and a port.
 };
 
 /// Sliding window of keyframes with landmarks. Keyframes have consecutive ids; the oldest leave.

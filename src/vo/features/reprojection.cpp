@@ -48,17 +48,18 @@ Vec3 ray_of(const CameraModel& camera, double u, double v) {
   return {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0};
 }
 
-Vec2 seen_by_row(const CameraModel& camera, const RowShift& rows, const Vec2& pixel, double* rho) {
-  if (rows.none()) return pixel;
-  const Vec3 q = ray_of(camera, pixel.x(), pixel.y()) + *rho * rows.at(pixel.y());
+Vec2 seen_by_shift(const CameraModel& camera, const ViewShift& shift, const Vec2& pixel,
+                   double* rho) {
+  if (shift.none()) return pixel;
+  const Vec3 q = ray_of(camera, pixel.x(), pixel.y()) + *rho * shift.at(pixel.x(), pixel.y());
   if (q.z() < kLeastDepth) return pixel;
   *rho /= q.z();
   return projected(camera, q);
 }
 
-Vec3 ray_at_instant(const CameraModel& camera, const RowShift& rows, double u, double v,
+Vec3 ray_at_instant(const CameraModel& camera, const ViewShift& shift, double u, double v,
                     double* rho) {
-  const Vec3 q = ray_of(camera, u, v) - *rho * rows.at(v);
+  const Vec3 q = ray_of(camera, u, v) - *rho * shift.at(u, v);
   if (q.z() < kLeastDepth) return ray_of(camera, u, v);
   *rho /= q.z();
   return q / q.z();

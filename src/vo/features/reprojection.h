@@ -1,8 +1,8 @@
 #pragma once
 
 #include "sovo/geometry/camera_model.h"
-#include "sovo/geometry/row_shift.h"
 #include "sovo/geometry/se3.h"
+#include "sovo/geometry/view_shift.h"
 
 namespace sovo {
 
@@ -30,13 +30,14 @@ bool reproject(const CameraModel& camera, const SE3& T_target_host, const Vec3& 
 /// The ray of a pixel of a pinhole camera, z = 1.
 Vec3 ray_of(const CameraModel& camera, double u, double v);
 
-/// What a camera with a rolling shutter sees at `pixel`, `rho` near, at its image's instant [1/m]:
-/// where it is seen in the image, and, in `rho`, how near.
-Vec2 seen_by_row(const CameraModel& camera, const RowShift& rows, const Vec2& pixel, double* rho);
+/// What lies at `pixel`, `rho` near [1/m], by the camera's instant and centre: where it is seen by
+/// a rolling shutter or through a port and, in `rho`, how near.
+Vec2 seen_by_shift(const CameraModel& camera, const ViewShift& shift, const Vec2& pixel,
+                   double* rho);
 
-/// The ray at the image's instant of what is seen at (u, v), `rho` near, which becomes that of the
-/// instant [1/m].
-Vec3 ray_at_instant(const CameraModel& camera, const RowShift& rows, double u, double v,
+/// The ray at the camera's instant and from its centre of what is seen at (u, v), `rho` near, which
+/// becomes that of the instant [1/m].
+Vec3 ray_at_instant(const CameraModel& camera, const ViewShift& shift, double u, double v,
                     double* rho);
 
 /// How the surroundings of `ray` are mapped into the target when they are as deep as it is:

@@ -63,12 +63,13 @@ TEST_F(ReprojectionAt, ItsDepthIsThatOfThePoint) {
 
 TEST_F(ReprojectionAt, RowsOfARollingShutterShowItAtTheirOwnInstants) {
   // A camera that comes forward by 0.6 mm a row and to the side.
-  const RowShift rows{.per_row = Vec3(3e-4, -2e-4, -6e-4), .middle = 239.5};
+  const ViewShift rows{.per_row = Vec3(3e-4, -2e-4, -6e-4), .middle = 239.5};
   const Vec2 instant(211.0, 437.0);
   const double rho = 0.4;
   double rho_seen = rho;
-  const Vec2 seen = seen_by_row(camera_, rows, instant, &rho_seen);
-  const Vec3 point = ray_of(camera_, instant.x(), instant.y()) / rho + rows.at(instant.y());
+  const Vec2 seen = seen_by_shift(camera_, rows, instant, &rho_seen);
+  const Vec3 point =
+      ray_of(camera_, instant.x(), instant.y()) / rho + rows.at(instant.x(), instant.y());
   EXPECT_LT((seen - *camera_.project(point)).norm(), 1e-9);
   EXPECT_NEAR(rho_seen, 1.0 / point.z(), 1e-12);
   EXPECT_GT((seen - instant).norm(), 1.0);
@@ -78,7 +79,7 @@ TEST_F(ReprojectionAt, RowsOfARollingShutterShowItAtTheirOwnInstants) {
   EXPECT_LT((*camera_.project(ray) - instant).norm(), 0.03 * (seen - instant).norm());
   EXPECT_NEAR(back, rho, 0.001 * rho);
   double same = rho;
-  EXPECT_EQ(seen_by_row(camera_, {}, instant, &same), instant);
+  EXPECT_EQ(seen_by_shift(camera_, {}, instant, &same), instant);
   EXPECT_EQ(same, rho);
 }
 

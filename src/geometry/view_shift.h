@@ -1,0 +1,91 @@
+#pragma once
+
+#include <optional>
+
+#include "sovo/geometry/camera_model.h"
+#include "sovo/geometry/se3.h"
+#include "sovo/geometry/types.h"
+
+namespace sovo {
+
+/// Rays of a pinhole's pixels that do not meet in its centre, for it is behind a flat port.
+struct AxialRays {
+  FlatPort port;
+  double fx = 1.0, fy = 1.0, cx = 0.0, cy = 0.0;  ///< Of the pinhole [px].
+
+  /// Of a camera whose image is straightened; nothing where it has no port.
+  static std::optional<AxialRays> of(const CameraModel& camera);
+
+  /// Where the ray of a pixel passes the port's normal, from the camera's origin [m].
+  double offset(double u, double v) const {
+    return port.offset({(u - cx) / fx, (v - cy) / fy, 1.0});
+  }
+};
+
+/// What makes a point that is at X in the camera at the image's instant be seen as if it were at
+/// X + at(u, v), in the camera's axes, where it is seen at (u, v): the straight way of the camera
+/// while the image is read out row after row, and a flat port.
+struct ViewShift {
+  Vec3 per_row = Vec3::Zero();  ///< Of a rolling shutter [the map's unit of length].
+  double middle = 0.0;          ///< Row of the image's instant [px].
+  std::optional<AxialRays> axial = std::nullopt;  ///< Of a flat port; the map's unit is a metre.
+
+  Vec3 at(double u, double v) const {
+    const Vec3 way = (v - middle) * per_row;
+    return axial ? Vec3(way - axial->offset(u, v) * axial->port.normal) : way;
+  }
+  bool none() const { return per_row.isZero(0.0) && !axial; }
+};
+
+/// The same for a point that one image of a camera shows and another one is to show: what it adds
+/// to the translation of T_target_host. It turns and stretches that way, as a matrix that is
+/// constant for a pixel of the host and one of the target: were it a constant of its own, a map
+/// would take another scale only to be moved less.
+class PairViewShift {
+ public:
+  PairViewShift() = default;
+  /// By the poses at which the images' shifts are known.
+  PairViewShift(const SE3& T_target_host, const ViewShift& host, const ViewShift& target);
+
+  bool none() const { return none_; }
+
+  /// Of what is in one pixel of the host and in one of the target.
+  struct Displacement {
+    float share = 0.0F;
+    Eigen::Vector3f across = Eigen::Vector3f::Zero();  ///< At the poses' own translation.
+    Eigen::Vector3f along = Eigen::Vector3f::Zero();   ///< That translation over its square.
+    Eigen::Vector3f fixed = Eigen::Vector3f::Zero();
+
+    /// Translation that a point is seen by.
+    Eigen::Vector3f applied(const Eigen::Vector3f& t) const {
+      return (1.0F + share) * t + along.dot(t) * across + fixed;
+    }
+    /// d r / d t where `d` is d r / d (applied t).
+    Eigen::Vector3f chain(const Eigen::Vector3f& d) const {
+      return (1.0F + share) * d + d.dot(across) * along;
+    }
+  };
+  Displacement at(const Eigen::Vector2f& host_pixel, const Eigen::Vector2f& target_pixel) const;
+  /// The same where the target's pixel, which is looked for in the image of that size, is given by
+  /// homogeneous coordinates; the host's one counts where it is behind the camera.
+  Displacement at(const Eigen::Vector2f& host_pixel, const Eigen::Vector3f& seen, int width,
+                  int height) const;
+
+ private:
+  /// What a weight of one adds.
+  struct Part {
+    float share = 0.0F;
+    Eigen::Vector3f across = Eigen::Vector3f::Zero(), fixed = Eigen::Vector3f::Zero();
+  };
+  static Part split(const Vec3& direction, const Vec3& t, double most);
+  void add(const Part& part, float weight, Displacement* to) const;
+
+  Part host_, target_;              ///< Of a row.
+  Part host_axial_, target_axial_;  ///< Of a metre along the port's normal.
+  std::optional<AxialRays> host_rays_, target_rays_;
+  Eigen::Vector3f along_ = Eigen::Vector3f::Zero();
+  float middle_ = 0.0F;
+  bool none_ = true;
+};
+
+}  // namespace sovo

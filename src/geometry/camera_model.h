@@ -81,7 +81,7 @@ struct CameraModel {
   Mat3 matrix() const;
 
  private:
-  std::optional<Vec2> project_in_air(const Vec3& direction, Mat23* jacobian) const;
+  std::optional<Vec2> project_in_air(const Vec3& p, Mat23* jacobian) const;
   std::optional<Vec3> unproject_in_air(const Vec2& pixel) const;
 };
 

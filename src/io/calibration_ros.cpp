@@ -158,16 +158,16 @@ std::string camera_info(const std::string& name, const CameraModel& camera, cons
 
 }  // namespace
 
-CameraInfoPair format_ros_calibration(const StereoRig& given) {
-  const StereoRig rig = without_ports(given);
-  const Rectification rectified = rectify(rig);
+CameraInfoPair format_ros_calibration(const StereoRig& rig) {
+  const StereoRig plain = without_ports(rig);
+  const Rectification rectified = rectify(plain);
   MatX p(3, 4);
   p << rectified.focal, 0, rectified.cx, 0, 0, rectified.focal, rectified.cy, 0, 0, 0, 1, 0;
   MatX p_right = p;
-  p_right(0, 3) = -rectified.focal * rig.baseline();
+  p_right(0, 3) = -rectified.focal * plain.baseline();
   const std::string name = rig.name.empty() ? "stereo" : rig.name;
-  return {camera_info(name + "_left", rig.left, rectified.left, p),
-          camera_info(name + "_right", rig.right, rectified.right, p_right)};
+  return {camera_info(name + "_left", plain.left, rectified.left, p),
+          camera_info(name + "_right", plain.right, rectified.right, p_right)};
 }
 
 }  // namespace sovo

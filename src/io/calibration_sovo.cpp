@@ -248,24 +248,24 @@ Calibration parse_sovo(const std::string& text, const std::string& path) {
 
 }  // namespace calibration_formats
 
-std::string format_sovo_calibration(const StereoRig& as_used, const PhotometricFiles& files) {
-  StereoRig rig = as_used;
-  move_origins(-1.0, &rig);
+std::string format_sovo_calibration(const StereoRig& rig, const PhotometricFiles& files) {
+  StereoRig own = rig;  // from the cameras' own centres
+  move_origins(-1.0, &own);
   CalibrationFile file;
   file.name = rig.name;
-  for (const CameraModel* camera : {&rig.left, &rig.right}) {
+  for (const CameraModel* camera : {&own.left, &own.right}) {
     if (!camera->port) continue;
     file.has_water = true;
     file.water = camera->port->water;
   }
-  file.left = section_of(rig.left);
-  file.right = section_of(rig.right);
+  file.left = section_of(own.left);
+  file.right = section_of(own.right);
   file.left.response = files.left_response;
   file.left.vignette = files.left_vignette;
   file.right.response = files.right_response;
   file.right.vignette = files.right_vignette;
-  file.T_right_left = rows_of(rig.T_right_left);
-  file.T_base_left = rows_of(rig.T_base_left);
+  file.T_right_left = rows_of(own.T_right_left);
+  file.T_base_left = rows_of(own.T_base_left);
   return dump_config(file);
 }
 

@@ -353,7 +353,8 @@ TEST(Calibration, SurvivesTruncatedAndRandomFiles) {
   folder.write("right.yaml", pair.right);
   std::mt19937 random(3);
   for (const std::string& text :
-       {kKitti, kKalibr, kOpencv, pair.left, format_sovo_calibration(some_rig())}) {
+       {kKitti, kKalibr, kOpencv, pair.left, format_sovo_calibration(some_rig()),
+        format_sovo_calibration(rig_behind_ports())}) {
     for (int i = 0; i < 100; ++i) {
       std::string noisy = i % 2 == 0 ? text.substr(0, random() % text.size()) : text;
       for (int k = 0; k < 3 * (i % 2) && !noisy.empty(); ++k) {

@@ -28,6 +28,14 @@ inline StereoRig some_rig() {
   return rig;
 }
 
+/// The same in water, behind ports.
+inline StereoRig rig_behind_ports() {
+  StereoRig rig = some_rig();
+  rig.left.port = {.distance = 0.02, .thickness = 0.008, .centre = -0.01};
+  rig.right.port = {.distance = 0.03, .glass = 1.52, .centre = -0.012};
+  return rig;
+}
+
 inline void expect_same_camera(const CameraModel& a, const CameraModel& b) {
   EXPECT_EQ(a.width, b.width);
   EXPECT_EQ(a.height, b.height);

@@ -1,12 +1,34 @@
 #include "sovo/geometry/view_shift.h"
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 namespace sovo {
 
 std::optional<AxialRays> AxialRays::of(const CameraModel& camera) {
   if (!camera.port) return std::nullopt;
-  return AxialRays{*camera.port, camera.fx, camera.fy, camera.cx, camera.cy};
+  auto grid = std::make_shared<Grid>();
+  grid->normal = camera.port->normal;
+  grid->reach = camera.port->distance + camera.port->thickness;
+  const auto nodes = [](int pixels) {
+    return static_cast<std::size_t>(std::ceil(static_cast<float>(pixels) * kPerPixel)) + 1;
+  };
+  const std::size_t rows = nodes(camera.height);
+  grid->columns = nodes(camera.width);
+  grid->last_x = std::nextafter(static_cast<float>(grid->columns - 1), 0.0F);
+  grid->last_y = std::nextafter(static_cast<float>(rows - 1), 0.0F);
+  for (std::size_t j = 0; j < rows; ++j) {
+    for (std::size_t i = 0; i < grid->columns; ++i) {
+      const Vec2 pixel(static_cast<double>(i), static_cast<double>(j));
+      const Vec2 at = pixel / double{kPerPixel};
+      const Vec3 ray((at.x() - camera.cx) / camera.fx, (at.y() - camera.cy) / camera.fy, 1.0);
+      grid->offsets.push_back(static_cast<float>(camera.port->offset(ray)));
+    }
+  }
+  AxialRays rays;
+  rays.grid_ = std::move(grid);
+  return rays;
 }
 
 PairViewShift::PairViewShift(const SE3& T_target_host, const ViewShift& host,
@@ -21,11 +43,8 @@ PairViewShift::PairViewShift(const SE3& T_target_host, const ViewShift& host,
   const double rows = 2.0 * target.middle;
   host_ = split(-(R * host.per_row), t, rows);
   target_ = split(target.per_row, t, rows);
-  const auto reach = [](const FlatPort& port) { return port.distance + port.thickness; };
-  if (host_rays_) host_axial_ = split(R * host_rays_->port.normal, t, reach(host_rays_->port));
-  if (target_rays_) {
-    target_axial_ = split(-target_rays_->port.normal, t, reach(target_rays_->port));
-  }
+  if (host_rays_) host_axial_ = split(R * host_rays_->normal(), t, host_rays_->reach());
+  if (target_rays_) target_axial_ = split(-target_rays_->normal(), t, target_rays_->reach());
   if (t.squaredNorm() > 0.0) along_ = (t / t.squaredNorm()).cast<float>();
 }
 
@@ -50,11 +69,10 @@ PairViewShift::Displacement PairViewShift::at(const Eigen::Vector2f& host_pixel,
   out.along = along_;
   add(host_, host_pixel.y() - middle_, &out);
   add(target_, target_pixel.y() - middle_, &out);
-  const auto offset = [](const AxialRays& rays, const Eigen::Vector2f& pixel) {
-    return static_cast<float>(rays.offset(double{pixel.x()}, double{pixel.y()}));
-  };
-  if (host_rays_) add(host_axial_, offset(*host_rays_, host_pixel), &out);
-  if (target_rays_) add(target_axial_, offset(*target_rays_, target_pixel), &out);
+  if (host_rays_) add(host_axial_, host_rays_->offset(host_pixel.x(), host_pixel.y()), &out);
+  if (target_rays_) {
+    add(target_axial_, target_rays_->offset(target_pixel.x(), target_pixel.y()), &out);
+  }
   return out;
 }
 

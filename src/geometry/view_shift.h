@@ -1,6 +1,10 @@
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
+#include <memory>
 #include <optional>
+#include <vector>
 
 #include "sovo/geometry/camera_model.h"
 #include "sovo/geometry/se3.h"
@@ -8,18 +12,40 @@
 
 namespace sovo {
 
-/// Rays of a pinhole's pixels that do not meet in its centre, for it is behind a flat port.
-struct AxialRays {
-  FlatPort port;
-  double fx = 1.0, fy = 1.0, cx = 0.0, cy = 0.0;  ///< Of the pinhole [px].
-
+/// Rays of a pinhole's pixels that do not meet in its centre, for it is behind a flat port. Knows
+/// them at every eighth pixel, for they are asked for by the thousand; copies share that.
+class AxialRays {
+ public:
   /// Of a camera whose image is straightened; nothing where it has no port.
   static std::optional<AxialRays> of(const CameraModel& camera);
 
-  /// Where the ray of a pixel passes the port's normal, from the camera's origin [m].
-  double offset(double u, double v) const {
-    return port.offset({(u - cx) / fx, (v - cy) / fy, 1.0});
+  /// Where the ray of a pixel passes the port's normal, from the camera's origin [m]; beyond the
+  /// image that of the nearest pixel.
+  float offset(float u, float v) const {
+    const float x = std::clamp(u * kPerPixel, 0.0F, grid_->last_x);
+    const float y = std::clamp(v * kPerPixel, 0.0F, grid_->last_y);
+    const auto i = static_cast<std::size_t>(x);
+    const auto j = static_cast<std::size_t>(y);
+    const float* at = grid_->offsets.data() + j * grid_->columns + i;
+    const float fx = x - static_cast<float>(i);
+    const float upper = at[0] + fx * (at[1] - at[0]);
+    const float lower = at[grid_->columns] + fx * (at[grid_->columns + 1] - at[grid_->columns]);
+    return upper + (y - static_cast<float>(j)) * (lower - upper);
   }
+  const Vec3& normal() const { return grid_->normal; }
+  /// No ray passes farther from another one [m].
+  double reach() const { return grid_->reach; }
+
+ private:
+  static constexpr float kPerPixel = 0.125F;
+  struct Grid {
+    Vec3 normal = Vec3::UnitZ();
+    double reach = 0.0;
+    std::size_t columns = 0;
+    float last_x = 0.0F, last_y = 0.0F;  ///< Least that has no node to its right, or below.
+    std::vector<float> offsets;          ///< Rows first [m].
+  };
+  std::shared_ptr<const Grid> grid_;
 };
 
 /// What makes a point that is at X in the camera at the image's instant be seen as if it were at
@@ -32,7 +58,9 @@ struct ViewShift {
 
   Vec3 at(double u, double v) const {
     const Vec3 way = (v - middle) * per_row;
-    return axial ? Vec3(way - axial->offset(u, v) * axial->port.normal) : way;
+    if (!axial) return way;
+    return way -
+           double{axial->offset(static_cast<float>(u), static_cast<float>(v))} * axial->normal();
   }
   bool none() const { return per_row.isZero(0.0) && !axial; }
 };

@@ -30,15 +30,14 @@ class EpipolarCurve {
       : target_(&target),
         infinity_(std::move(infinity)),
         slope_(std::move(slope)),
-        d_infinity_(std::move(d_infinity)) {}
+        d_infinity_(std::move(d_infinity)),
+        slope_far_(slope_ - target.ray_offset(infinity_)) {}
 
   /// Nothing where the target camera cannot see the point. rho may be slightly negative.
   std::optional<CurvePoint> at(double rho) const {
     Mat23 jacobian;
     Vec3 slope = slope_;
-    for (int i = 0; target_->port && i < 2; ++i) {
-      slope = slope_ - target_->ray_offset(infinity_ + rho * slope);
-    }
+    if (target_->port) slope -= target_->ray_offset(infinity_ + rho * slope_far_);
     const auto pixel = target_->project(infinity_ + rho * slope, &jacobian);
     if (!pixel) return std::nullopt;
     return CurvePoint{*pixel, jacobian * slope, jacobian * d_infinity_};
@@ -53,6 +52,7 @@ class EpipolarCurve {
   Vec3 infinity_;
   Vec3 slope_;
   Mat32 d_infinity_;
+  Vec3 slope_far_;  ///< Where the target is behind a port, by the ray of what is infinitely far.
 };
 
 /// Where a pixel of the left image, a pinhole's, may lie in the right one: X_right = R m + rho t,

@@ -118,14 +118,14 @@ std::string FramePreparation::exposure_problem(const SideImage& side) {
 void FramePreparation::add_resolutions(const StereoRig& rig, const ImageU8& mask,
                                        int max_halvings) {
   constexpr int kLeastSide = 80;  // with less there is no room for points
-  resolutions_.push_back({rig, mask});
+  resolutions_.push_back({rig, mask, AxialRays::of(rig.left)});
   for (int h = 1; h <= max_halvings; ++h) {
     StereoRig halved = rig;
     halved.left = rig.left.at_level(h);
     halved.right = rig.right.at_level(h);
     const auto& [l, r] = std::tie(halved.left, halved.right);
     if (std::min({l.width, l.height, r.width, r.height}) < kLeastSide) return;
-    resolutions_.push_back({halved, reduced_mask(mask, 1 << h)});
+    resolutions_.push_back({halved, reduced_mask(mask, 1 << h), AxialRays::of(halved.left)});
   }
 }
 
@@ -160,7 +160,7 @@ double FramePreparation::displacement(const Vec6& rate_difference, double rho) c
 
 ViewShift FramePreparation::view_shift(const Vec6& rate, int halvings) const {
   ViewShift shift;
-  shift.axial = AxialRays::of(rig(halvings).left);
+  shift.axial = at(halvings).rays;
   if (!left_unroller_) return shift;
   const int raw_rows = cameras_.rig.left.height / downscale_;
   const double seconds_a_row = readout_s_ / (raw_rows - 1) * left_unroller_->raw_rows();

@@ -77,6 +77,7 @@ class FramePreparation {
   struct Resolution {
     StereoRig rig;
     ImageU8 left_mask;
+    std::optional<AxialRays> rays;  ///< Of the left camera, where it is behind a port.
   };
   const Resolution& at(int halvings) const {
     return resolutions_[static_cast<std::size_t>(halvings)];

@@ -133,6 +133,12 @@ inline float to_air(const Pane& pane, Direction* q, Direction* dq) {
   return std::min(along, root2 - 1e-4F * squared);
 }
 
+/// m + w (begin - own normal).
+inline Direction seen_from(Direction m, float w, Direction begin, Direction normal, float own) {
+  return {m.x + w * (begin.x - own * normal.x), m.y + w * (begin.y - own * normal.y),
+          m.z + w * (begin.z - own * normal.z)};
+}
+
 template <Distortion D>
 inline Moving distorted(const Intrinsics& c, Direction q, Direction dq) {
   if constexpr (D == Distortion::kEquidistant) return equidistant(c, q, dq);
@@ -170,33 +176,40 @@ void project_all(const Intrinsics c, const ScalePoints& points, float inverse_sc
 }
 
 /// The same through a port: the direction is m + w (t + o - o'), where the left ray begins at o and
-/// the right one at o', which hardly depends on w.
+/// the right one at o', which hardly depends on w: the second round is right to a hundredth of it.
 template <Distortion D>
 void project_through(const Pane pane, const Intrinsics c, const ScalePoints& points,
                      float inverse_scale, ScaleProjections* out) {
-  const float* nl = points.normal;
-  const float* t = points.t;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(points.padded); ++i) {
-    const float w = points.inverse_depth[i] * inverse_scale;
-    const float o = points.ray_offset[i];
-    const Direction m = {points.mx[i], points.my[i], points.mz[i]};
-    const Direction begin = {t[0] + o * nl[0], t[1] + o * nl[1], t[2] + o * nl[2]};
-    float own = 0.0F;
-    for (int round = 0; round < 2; ++round) {
-      own = ray_offset(
-          pane, {m.x + w * (begin.x - own * pane.n[0]), m.y + w * (begin.y - own * pane.n[1]),
-                 m.z + w * (begin.z - own * pane.n[2])});
-    }
-    Direction dq = {-w * (begin.x - own * pane.n[0]), -w * (begin.y - own * pane.n[1]),
-                    -w * (begin.z - own * pane.n[2])};
-    Direction q = {m.x - dq.x, m.y - dq.y, m.z - dq.z};
+  const float* mx = points.mx.data();
+  const float* my = points.my.data();
+  const float* mz = points.mz.data();
+  const float* rho = points.inverse_depth.data();
+  const float* ray_offsets = points.ray_offset.data();
+  float* x = out->x.data();
+  float* y = out->y.data();
+  float* jx = out->jx.data();
+  float* jy = out->jy.data();
+  const Direction t = {points.t[0], points.t[1], points.t[2]};
+  const Direction left = {points.normal[0], points.normal[1], points.normal[2]};
+  const Direction right = {pane.n[0], pane.n[1], pane.n[2]};
+  const int n = points.padded;
+#pragma GCC ivdep
+  for (int i = 0; i < n; ++i) {
+    const float w = rho[i] * inverse_scale;
+    const float o = ray_offsets[i];
+    const Direction m = {mx[i], my[i], mz[i]};
+    const Direction begin = {t.x + o * left.x, t.y + o * left.y, t.z + o * left.z};
+    const float first = ray_offset(pane, seen_from(m, w, begin, right, 0.0F));
+    const float own = ray_offset(pane, seen_from(m, w, begin, right, first));
+    Direction q = seen_from(m, w, begin, right, own);
+    Direction dq = {m.x - q.x, m.y - q.y, m.z - q.z};
     const float margin = to_air(pane, &q, &dq);
     const Moving p = distorted<D>(c, q, dq);
     const float gone = p.away + away(margin);
-    out->x[i] = c.fx * p.x + c.cx + gone;
-    out->y[i] = c.fy * p.y + c.cy + gone;
-    out->jx[i] = c.fx * p.dx;
-    out->jy[i] = c.fy * p.dy;
+    x[i] = c.fx * p.x + c.cx + gone;
+    y[i] = c.fy * p.y + c.cy + gone;
+    jx[i] = c.fx * p.dx;
+    jy[i] = c.fy * p.dy;
   }
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "support/cameras.h"
 #include "support/numeric.h"
@@ -137,6 +138,26 @@ TEST(PairViewShift, BringsAPointWhereARayThroughThePortShowsIt) {
     }
   }
   EXPECT_GT(most, 1.0) << "or the port does nothing";
+}
+
+TEST(AxialRays, PassTheNormalWhereThePortSays) {
+  const Vec3 tilted = Vec3(0.08, -0.05, 1.0).normalized();
+  const CameraModel camera =
+      straight_camera({.distance = 0.04, .thickness = 0.02, .normal = tilted, .centre = -0.02});
+  const auto rays = AxialRays::of(camera);
+  ASSERT_TRUE(rays);
+  EXPECT_EQ(rays->normal(), tilted);
+  for (double u = 1.0; u < 640.0; u += 31.3) {
+    for (double v = 1.0; v < 400.0; v += 23.7) {
+      const double exact = camera.port->offset(*camera.unproject({u, v}));
+      EXPECT_NEAR(rays->offset(static_cast<float>(u), static_cast<float>(v)), exact,
+                  1e-5 + 2e-3 * std::abs(exact));
+      EXPECT_LT(std::abs(exact), rays->reach());
+    }
+  }
+  EXPECT_EQ(rays->offset(-1e6F, -1e6F), rays->offset(0.0F, 0.0F));
+  EXPECT_TRUE(std::isfinite(rays->offset(1e9F, 1e9F)));
+  EXPECT_FALSE(AxialRays::of(test::make_camera(640, 400, 420, 420, 318, 203)));
 }
 
 TEST(PairViewShift, LooksForThePixelWithinTheImage) {

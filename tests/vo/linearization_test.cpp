@@ -146,9 +146,9 @@ class WindowJacobian : public ::testing::Test {
 
   /// The camera is behind a port.
   void dive() {
-    const CameraModel& c = window_.camera();
-    const FlatPort port{.distance = 0.3, .thickness = 0.05, .normal = {0.02, 0.01, 0.9997}};
-    window_[0].shift.axial = window_[1].shift.axial = AxialRays{port, c.fx, c.fy, c.cx, c.cy};
+    CameraModel camera = window_.camera();
+    camera.port = {.distance = 0.3, .thickness = 0.05, .normal = {0.02, 0.01, 0.9997}};
+    window_[0].shift.axial = window_[1].shift.axial = AxialRays::of(camera);
     window_.update_geometry();
     const Vec2 seen = project(point().u, point().v, here());
     shift_ = window_.pair(0, 1).shift.at({point().u, point().v}, seen.cast<float>());

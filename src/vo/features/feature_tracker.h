@@ -74,7 +74,7 @@ class FeatureTracker {
   std::vector<PatchMatch> follow(const FeatureReference& reference, const MonoFrame& frame,
                                  const SE3& T_current_reference, const std::vector<bool>& wanted,
                                  int levels) const;
-  Vec2 shift_displacement(const ViewShift& rows, const SE3& T_current_host,
+  Vec2 shift_displacement(const ViewShift& shift, const SE3& T_current_host,
                           const ReferenceFeature& feature, const Vec2& pixel) const;
   FeaturePose pose_of(const FeatureReference& reference, const std::vector<PatchMatch>& matches,
                       const SE3& start) const;

@@ -31,13 +31,13 @@ class EpipolarCurve {
         infinity_(std::move(infinity)),
         slope_(std::move(slope)),
         d_infinity_(std::move(d_infinity)),
-        slope_far_(slope_ - target.ray_offset(infinity_)) {}
+        far_(target.port ? target.port->offset(infinity_) : 0.0) {}
 
   /// Nothing where the target camera cannot see the point. rho may be slightly negative.
   std::optional<CurvePoint> at(double rho) const {
     Mat23 jacobian;
     Vec3 slope = slope_;
-    if (target_->port) slope -= target_->ray_offset(infinity_ + rho * slope_far_);
+    if (target_->port) slope -= offset_at(rho) * target_->port->normal;
     const auto pixel = target_->project(infinity_ + rho * slope, &jacobian);
     if (!pixel) return std::nullopt;
     return CurvePoint{*pixel, jacobian * slope, jacobian * d_infinity_};
@@ -48,11 +48,25 @@ class EpipolarCurve {
   const Vec3& slope() const { return slope_; }
 
  private:
+  /// How the target's ray passes its origin, behind a port: two rounds from that of infinity, and
+  /// where they lead to when steps shrink by equal shares (Aitken) [m].
+  double offset_at(double rho) const {
+    const FlatPort& port = *target_->port;
+    const auto next = [&](double offset) {
+      return port.offset(infinity_ + rho * (slope_ - offset * port.normal));
+    };
+    const double first = next(far_);
+    const double second = next(first);
+    const double step = second - first;
+    const double bend = step - (first - far_);
+    return second - step * step * bend / (bend * bend + 1e-20);
+  }
+
   const CameraModel* target_;
   Vec3 infinity_;
   Vec3 slope_;
   Mat32 d_infinity_;
-  Vec3 slope_far_;  ///< Where the target is behind a port, by the ray of what is infinitely far.
+  double far_;  ///< Where the target is behind a port: how its ray to infinity passes [m].
 };
 
 /// Where a pixel of the left image, a pinhole's, may lie in the right one: X_right = R m + rho t,

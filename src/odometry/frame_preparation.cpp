@@ -79,6 +79,9 @@ FramePreparation::FramePreparation(const StereoOdometryConfig& config, const Ste
     right_unroller_.emplace(rig.right, rig.right);
   }
   add_resolutions(rig, mask, config.max_halvings);
+  if (config.mode != OdometryMode::kMono) {
+    for (Resolution& r : resolutions_) r.rays = AxialRays::of(r.rig.left);
+  }
   const bool direct = config.backend == Backend::kDirect;
   if (direct && config.lighting == Lighting::kAuto && config.mode != OdometryMode::kMono) {
     moving_light_ = std::make_unique<MovingLight>(config.moving_light);
@@ -118,14 +121,14 @@ std::string FramePreparation::exposure_problem(const SideImage& side) {
 void FramePreparation::add_resolutions(const StereoRig& rig, const ImageU8& mask,
                                        int max_halvings) {
   constexpr int kLeastSide = 80;  // with less there is no room for points
-  resolutions_.push_back({rig, mask, AxialRays::of(rig.left)});
+  resolutions_.push_back({rig, mask, {}});
   for (int h = 1; h <= max_halvings; ++h) {
     StereoRig halved = rig;
     halved.left = rig.left.at_level(h);
     halved.right = rig.right.at_level(h);
     const auto& [l, r] = std::tie(halved.left, halved.right);
     if (std::min({l.width, l.height, r.width, r.height}) < kLeastSide) return;
-    resolutions_.push_back({halved, reduced_mask(mask, 1 << h), AxialRays::of(halved.left)});
+    resolutions_.push_back({halved, reduced_mask(mask, 1 << h), {}});
   }
 }
 

@@ -77,7 +77,8 @@ class FramePreparation {
   struct Resolution {
     StereoRig rig;
     ImageU8 left_mask;
-    std::optional<AxialRays> rays;  ///< Of the left camera, where it is behind a port.
+    /// Of the left camera, where it is behind a port; not in mode mono, whose unit is no metre.
+    std::optional<AxialRays> rays;
   };
   const Resolution& at(int halvings) const {
     return resolutions_[static_cast<std::size_t>(halvings)];

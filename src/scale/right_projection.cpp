@@ -133,6 +133,14 @@ inline float to_air(const Pane& pane, Direction* q, Direction* dq) {
   return std::min(along, root2 - 1e-4F * squared);
 }
 
+/// What is left to where a, b, c, ... lead to, when its steps shrink by equal shares.
+inline float aitken(float a, float b, float c) {
+  const float step = c - b;
+  const float bend = step - (b - a);
+  // Steps that hardly shrink, for there are none, lead nowhere.
+  return -step * step * bend / (bend * bend + 1e-14F);
+}
+
 /// m + w (begin - own normal).
 inline Direction seen_from(Direction m, float w, Direction begin, Direction normal, float own) {
   return {m.x + w * (begin.x - own * normal.x), m.y + w * (begin.y - own * normal.y),
@@ -176,7 +184,7 @@ void project_all(const Intrinsics c, const ScalePoints& points, float inverse_sc
 }
 
 /// The same through a port: the direction is m + w (t + o - o'), where the left ray begins at o and
-/// the right one at o', which hardly depends on w: the second round is right to a hundredth of it.
+/// the right one at o', which two rounds find.
 template <Distortion D>
 void project_through(const Pane pane, const Intrinsics c, const ScalePoints& points,
                      float inverse_scale, ScaleProjections* out) {
@@ -200,7 +208,8 @@ void project_through(const Pane pane, const Intrinsics c, const ScalePoints& poi
     const Direction m = {mx[i], my[i], mz[i]};
     const Direction begin = {t.x + o * left.x, t.y + o * left.y, t.z + o * left.z};
     const float first = ray_offset(pane, seen_from(m, w, begin, right, 0.0F));
-    const float own = ray_offset(pane, seen_from(m, w, begin, right, first));
+    const float second = ray_offset(pane, seen_from(m, w, begin, right, first));
+    const float own = second + aitken(0.0F, first, second);
     Direction q = seen_from(m, w, begin, right, own);
     Direction dq = {m.x - q.x, m.y - q.y, m.z - q.z};
     const float margin = to_air(pane, &q, &dq);

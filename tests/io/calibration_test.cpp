@@ -64,12 +64,15 @@ TEST(Calibration, SovoRoundTripIsExact) {
   EXPECT_LT(distance(loaded->rig.T_base_left, rig.T_base_left), 1e-14);
 }
 
-TEST(Calibration, TheShippedExampleLoads) {
-  const auto loaded = load_calibration(
-      (std::filesystem::path(__FILE__).parent_path() / "../../config/cameras/example.yaml")
-          .string());
+TEST(Calibration, TheShippedExamplesLoad) {
+  const auto folder = std::filesystem::path(__FILE__).parent_path() / "../../config/cameras";
+  const auto loaded = load_calibration((folder / "example.yaml").string());
   ASSERT_TRUE(loaded) << loaded.error();
   EXPECT_DOUBLE_EQ(loaded->rig.baseline(), 0.11);
+  const auto underwater = load_calibration((folder / "underwater.yaml").string());
+  ASSERT_TRUE(underwater) << underwater.error();
+  EXPECT_TRUE(underwater->rig.left.port && underwater->rig.right.port);
+  EXPECT_NEAR(underwater->rig.baseline(), 0.18, 1e-3);
 }
 
 TEST(Calibration, RosRoundTrip) {

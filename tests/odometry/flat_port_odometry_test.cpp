@@ -5,6 +5,7 @@
 
 #include "odometry/odometry_test_support.h"
 #include "sovo/geometry/radtan_fit.h"
+#include "sovo/odometry/frame_preparation.h"
 
 namespace sovo {
 namespace {
@@ -80,6 +81,16 @@ INSTANTIATE_TEST_SUITE_P(
                     DivedKind{"Stereo", OdometryMode::kStereo, Backend::kDirect},
                     DivedKind{"Features", OdometryMode::kScale, Backend::kFeatures}),
     [](const testing::TestParamInfo<DivedKind>& kind) { return std::string(kind.param.name); });
+
+TEST(FlatPortsOfOneCamera, GoAlongWithFramesOnlyWhereLengthsAreMetres) {
+  StereoOdometryConfig config = test::test_config();
+  FramePreparation metric(config, dived_cameras());
+  EXPECT_FALSE(metric.prepare_left(dived_frame(0), nullptr).shift.none());
+  EXPECT_FALSE(metric.prepare_left(dived_frame(0), nullptr, 1).shift.none());
+  config.mode = OdometryMode::kMono;
+  FramePreparation mono(config, dived_cameras());
+  EXPECT_TRUE(mono.prepare_left(dived_frame(0), nullptr).shift.none());
+}
 
 /// A map whose unit is not known knows directions alone: they are those of panes that touch the
 /// cameras, whose rays meet.

@@ -6,8 +6,8 @@
 
 namespace sovo {
 
-std::optional<AxialRays> AxialRays::of(const CameraModel& camera) {
-  if (!camera.port) return std::nullopt;
+AxialRays AxialRays::of(const CameraModel& camera) {
+  if (!camera.port) return {};
   auto grid = std::make_shared<Grid>();
   grid->normal = camera.port->normal;
   grid->reach = camera.port->distance + camera.port->thickness;
@@ -43,8 +43,8 @@ PairViewShift::PairViewShift(const SE3& T_target_host, const ViewShift& host,
   const double rows = 2.0 * target.middle;
   host_ = split(-(R * host.per_row), t, rows);
   target_ = split(target.per_row, t, rows);
-  if (host_rays_) host_axial_ = split(R * host_rays_->normal(), t, host_rays_->reach());
-  if (target_rays_) target_axial_ = split(-target_rays_->normal(), t, target_rays_->reach());
+  if (!host_rays_.none()) host_axial_ = split(R * host_rays_.normal(), t, host_rays_.reach());
+  if (!target_rays_.none()) target_axial_ = split(-target_rays_.normal(), t, target_rays_.reach());
   if (t.squaredNorm() > 0.0) along_ = (t / t.squaredNorm()).cast<float>();
 }
 
@@ -69,9 +69,9 @@ PairViewShift::Displacement PairViewShift::at(const Eigen::Vector2f& host_pixel,
   out.along = along_;
   add(host_, host_pixel.y() - middle_, &out);
   add(target_, target_pixel.y() - middle_, &out);
-  if (host_rays_) add(host_axial_, host_rays_->offset(host_pixel.x(), host_pixel.y()), &out);
-  if (target_rays_) {
-    add(target_axial_, target_rays_->offset(target_pixel.x(), target_pixel.y()), &out);
+  if (!host_rays_.none()) add(host_axial_, host_rays_.offset(host_pixel.x(), host_pixel.y()), &out);
+  if (!target_rays_.none()) {
+    add(target_axial_, target_rays_.offset(target_pixel.x(), target_pixel.y()), &out);
   }
   return out;
 }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "sovo/geometry/camera_model.h"
@@ -16,11 +15,13 @@ namespace sovo {
 /// them at every eighth pixel, for they are asked for by the thousand; copies share that.
 class AxialRays {
  public:
-  /// Of a camera whose image is straightened; nothing where it has no port.
-  static std::optional<AxialRays> of(const CameraModel& camera);
+  AxialRays() = default;  ///< Of a pinhole without a port.
+  /// Of a camera whose image is straightened; none where it has no port.
+  static AxialRays of(const CameraModel& camera);
 
+  bool none() const { return grid_ == nullptr; }
   /// Where the ray of a pixel passes the port's normal, from the camera's origin [m]; beyond the
-  /// image that of the nearest pixel.
+  /// image that of the nearest pixel. Precondition, here and below: there is a port.
   float offset(float u, float v) const {
     const float x = std::clamp(u * kPerPixel, 0.0F, grid_->last_x);
     const float y = std::clamp(v * kPerPixel, 0.0F, grid_->last_y);
@@ -54,15 +55,15 @@ class AxialRays {
 struct ViewShift {
   Vec3 per_row = Vec3::Zero();  ///< Of a rolling shutter [the map's unit of length].
   double middle = 0.0;          ///< Row of the image's instant [px].
-  std::optional<AxialRays> axial = std::nullopt;  ///< Of a flat port; the map's unit is a metre.
+  AxialRays axial = {};         ///< Of a flat port; the map's unit is then a metre.
 
   Vec3 at(double u, double v) const {
     const Vec3 way = (v - middle) * per_row;
-    if (!axial) return way;
+    if (axial.none()) return way;
     return way -
-           double{axial->offset(static_cast<float>(u), static_cast<float>(v))} * axial->normal();
+           double{axial.offset(static_cast<float>(u), static_cast<float>(v))} * axial.normal();
   }
-  bool none() const { return per_row.isZero(0.0) && !axial; }
+  bool none() const { return per_row.isZero(0.0) && axial.none(); }
 };
 
 /// The same for a point that one image of a camera shows and another one is to show: what it adds
@@ -110,7 +111,7 @@ class PairViewShift {
 
   Part host_, target_;              ///< Of a row.
   Part host_axial_, target_axial_;  ///< Of a metre along the port's normal.
-  std::optional<AxialRays> host_rays_, target_rays_;
+  AxialRays host_rays_, target_rays_;
   Eigen::Vector3f along_ = Eigen::Vector3f::Zero();
   float middle_ = 0.0F;
   bool none_ = true;

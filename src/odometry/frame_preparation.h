@@ -78,7 +78,7 @@ class FramePreparation {
     StereoRig rig;
     ImageU8 left_mask;
     /// Of the left camera, where it is behind a port; not in mode mono, whose unit is no metre.
-    std::optional<AxialRays> rays;
+    AxialRays rays;
   };
   const Resolution& at(int halvings) const {
     return resolutions_[static_cast<std::size_t>(halvings)];

@@ -66,7 +66,7 @@ void set_points(const KeyframePoints& points, const ImageF& image, int halvings,
 
 /// What a flat port does is known in metres, which a map may not be made of yet.
 MonoFrame without_metres(MonoFrame frame) {
-  frame.shift.axial.reset();
+  frame.shift.axial = {};
   return frame;
 }
 

@@ -23,8 +23,9 @@ class AxialRays {
   /// Where the ray of a pixel passes the port's normal, from the camera's origin [m]; beyond the
   /// image that of the nearest pixel. Precondition, here and below: there is a port.
   float offset(float u, float v) const {
-    const float x = std::clamp(u * kPerPixel, 0.0F, grid_->last_x);
-    const float y = std::clamp(v * kPerPixel, 0.0F, grid_->last_y);
+    // In this order what is no number becomes 0, too.
+    const float x = std::min(std::max(0.0F, u * kPerPixel), grid_->last_x);
+    const float y = std::min(std::max(0.0F, v * kPerPixel), grid_->last_y);
     const auto i = static_cast<std::size_t>(x);
     const auto j = static_cast<std::size_t>(y);
     const float* at = grid_->offsets.data() + j * grid_->columns + i;
@@ -43,7 +44,7 @@ class AxialRays {
     Vec3 normal = Vec3::UnitZ();
     double reach = 0.0;
     std::size_t columns = 0;
-    float last_x = 0.0F, last_y = 0.0F;  ///< Least that has no node to its right, or below.
+    float last_x = 0.0F, last_y = 0.0F;  ///< Farthest with a node to its right, or below.
     std::vector<float> offsets;          ///< Rows first [m].
   };
   std::shared_ptr<const Grid> grid_;

@@ -157,6 +157,7 @@ TEST(AxialRays, PassTheNormalWhereThePortSays) {
   }
   EXPECT_EQ(rays.offset(-1e6F, -1e6F), rays.offset(0.0F, 0.0F));
   EXPECT_TRUE(std::isfinite(rays.offset(1e9F, 1e9F)));
+  EXPECT_EQ(rays.offset(NAN, NAN), rays.offset(0.0F, 0.0F));
   EXPECT_TRUE(AxialRays::of(test::make_camera(640, 400, 420, 420, 318, 203)).none());
 }
 

@@ -2,6 +2,7 @@
 #include <iostream>
 #include <memory>
 
+#include "sovo/app/calib_refine.h"
 #include "sovo/app/commands.h"
 #include "sovo/app/failure.h"
 #include "sovo/driver/dataset/dataset_source.h"
@@ -191,7 +192,7 @@ int convert_checked(const CalibOptions& options) {
 }  // namespace
 
 void add_calib_command(const Command& program) {
-  const Command command = program.add_command("calib", "Calibration files: show, convert, check");
+  const Command command = program.add_command("calib", "Calibration files: show, convert, check, refine");
   command.require_command();
   const auto options = std::make_shared<CalibOptions>();
 
@@ -216,6 +217,8 @@ void add_calib_command(const Command& program) {
   checking.option("--pairs", "How many pairs of it are looked at", &options->pairs)
       .in_range(1, 1000);
   checking.action([options] { return check(*options); });
+
+  add_calib_refine_command(command);
 }
 
 }  // namespace sovo::app

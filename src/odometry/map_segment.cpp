@@ -313,6 +313,7 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
                          static_cast<std::uint32_t>(out.map.bundle.residuals));
   }
   out.keyframes = {new_keyframe(job)};
+  out.keyframes.front().lens = out.map.bundle.lens;
   revise_left(std::exchange(out.map.left, {}), &out.keyframes);
   if (use_right && config_.mode != OdometryMode::kMono && vo_->snapshot()) {
     job.snapshot = *vo_->snapshot();

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,6 +12,7 @@
 #include "sovo/image/pyramid.h"
 #include "sovo/image/stereo_frame.h"
 #include "sovo/scale/scale_optimizer.h"
+#include "sovo/vo/lens_fit.h"
 
 namespace sovo {
 
@@ -133,6 +135,7 @@ struct KeyframeOutput {
   int halvings = 0;  ///< How often both were halved, unlike `u` and `v`.
   /// Of the size of `left`: 0 where what is seen moves along with the camera; null: nothing does.
   std::shared_ptr<const ImageU8> co_moving_mask;
+  std::optional<LensEvidence> lens;  ///< Where `vo.window.tell_lens` asks for it.
 };
 
 /// One run of the scale optimizer, a line of `--keyframes`.

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "sovo/geometry/linear_solvers.h"
+#include "sovo/vo/lens_equations.h"
 #include "sovo/vo/static_residual.h"
 
 namespace sovo {
@@ -300,6 +301,17 @@ double BundleAdjuster::scale_information(const WindowLinearization& at,
   return information;
 }
 
+std::optional<LensEvidence> BundleAdjuster::lens_evidence(const Window& window,
+                                                          const NormalEquations& system,
+                                                          double noise) const {
+  LensEquations equations(window);
+  problem_.visit_inliers(now_, [&](const PointRef& ref, double depth_damping,
+                                   std::span<const TargetResidual> inliers) {
+    equations.add(ref.host, *ref.point, depth_damping, inliers);
+  });
+  return equations.evidence(system, std::max(noise, 1.0));
+}
+
 NormalEquations BundleAdjuster::iterate(Window* window, BundleResult* result) {
   NormalEquations solved;
   double energy = now_.energy + prior_energy(*window);
@@ -376,6 +388,9 @@ BundleResult BundleAdjuster::optimize(Window* window) {
     constexpr double kSharedRight = 1.6;
     const double noise = kSharedRight * keyframe_variance(result.rmse, result.gradient_scatter);
     result.scale_variance = config_.static_weight * noise / information;
+  }
+  if (config_.tell_lens && window->size() > 2) {
+    result.lens = lens_evidence(*window, solved, result.rmse * result.rmse);
   }
   drop_bad_residuals(window);
   return result;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <optional>
 #include <vector>
 
 #include "sovo/vo/bundle_result.h"
@@ -103,6 +104,8 @@ class BundleAdjuster {
   /// last system that was solved.
   NormalEquations iterate(Window* window, BundleResult* result);
   void drop_bad_residuals(Window* window) const;
+  std::optional<LensEvidence> lens_evidence(const Window& window, const NormalEquations& system,
+                                            double noise) const;
   /// What static residuals that are inliers tell of a common factor of all depths.
   static double scale_information(const WindowLinearization& at,
                                   const std::vector<PointRef>& points);

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <limits>
+#include <optional>
 
 #include "sovo/geometry/types.h"
+#include "sovo/vo/lens_fit.h"
 
 namespace sovo {
 
@@ -20,6 +22,8 @@ struct BundleResult {
   /// Of a common factor of all depths, by the static residuals; infinite without any.
   double scale_variance = std::numeric_limits<double>::infinity();
   double gradient_scatter = 1.0;  ///< Of the residuals into the newest keyframe.
+  /// Where it was asked for, and the window tells something.
+  std::optional<LensEvidence> lens;
 };
 
 }  // namespace sovo

@@ -145,16 +145,26 @@ void PhotometricProblem::remember_poses() {
   }
 }
 
+/// Whether a residual was in view when it was sampled for this problem.
+bool PhotometricProblem::is_sampled(std::size_t residual) const {
+  return sampled_[residual].problem == problem_ && sampled_[residual].linearization >= 0;
+}
+
+/// How far a sampled residual's pattern has moved since, to first order.
+PatternShift PhotometricProblem::moved_since(const PointRef& ref, std::size_t residual,
+                                             int target) const {
+  const SampledResidual& at = sampled_[residual];
+  const auto rho_change = static_cast<float>(ref.point->rho - at.rho);
+  return pattern_shift(
+      at.linearized,
+      moved_[static_cast<std::size_t>(at.linearization)][pair_index(ref.host, target)], rho_change);
+}
+
 /// Whether a residual may be taken along its Jacobian from where it was sampled, and how far.
 bool PhotometricProblem::is_settled(const Block& block, std::size_t point, std::size_t residual,
                                     int target, PatternShift* shift) const {
-  const SampledResidual& at = sampled_[residual];
-  if (at.problem != problem_ || at.linearization < 0 || config_.resample_px <= 0.0) return false;
-  const auto rho_change = static_cast<float>(points_[point].point->rho - at.rho);
-  *shift = pattern_shift(
-      at.linearized,
-      moved_[static_cast<std::size_t>(at.linearization)][pair_index(block.host, target)],
-      rho_change);
+  if (!is_sampled(residual) || config_.resample_px <= 0.0) return false;
+  *shift = moved_since({block.host, points_[point].point}, residual, target);
   const auto limit = static_cast<float>(config_.resample_px);
   return shift->u * shift->u + shift->v * shift->v <= limit * limit;
 }
@@ -370,7 +380,7 @@ double PhotometricProblem::gradient_scatter(const WindowLinearization& at, int t
   for (std::size_t i = 0; i < at.residuals.size(); ++i) {
     const StoredResidual& stored = at.residuals[i];
     if (stored.target != target || stored.state != ResidualState::kIn) continue;
-    if (sampled_[i].problem != problem_ || sampled_[i].linearization < 0) continue;
+    if (!is_sampled(i)) continue;
     const ShiftPart part = shift_part(sampled_[i].linearized);
     squared_gradients += static_cast<double>(part.squared_gradient);
     hessians += static_cast<double>(part.hessian);
@@ -382,6 +392,24 @@ double PhotometricProblem::gradient_scatter(const WindowLinearization& at, int t
   // trace of its Hessian.
   const double variance = energy / (kPatternSize * count);
   return squared_gradients / (variance * hessians);
+}
+
+void PhotometricProblem::visit_inliers(const WindowLinearization& at,
+                                       const InlierVisitor& visit) const {
+  std::array<LinearizedResidual, kMaxSlots> moved;
+  std::array<TargetResidual, kMaxSlots> inliers;
+  for (std::size_t i = 0; i < points_.size(); ++i) {
+    std::size_t count = 0;
+    for (std::size_t k = first_[i]; k < first_[i + 1]; ++k) {
+      const StoredResidual& stored = at.residuals[k];
+      if (stored.state != ResidualState::kIn || !is_sampled(k)) continue;
+      moved[count] = sampled_[k].linearized;
+      move_residual(moved_since(points_[i], k, stored.target), &moved[count]);
+      inliers[count] = {stored.target, &moved[count]};
+      ++count;
+    }
+    if (count > 0) visit(points_[i], damping_[i], {inliers.data(), count});
+  }
 }
 
 void PhotometricProblem::write_back(const WindowLinearization& from) {

@@ -2,7 +2,9 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -144,6 +146,12 @@ class PhotometricProblem {
   /// none. `at`: as linearized last.
   double gradient_scatter(const WindowLinearization& at, int target) const;
 
+  /// Of each point the inliers, moved to the present estimate, and what was added to its H_rho.
+  /// `at`: as linearized last.
+  using InlierVisitor = std::function<void(const PointRef& point, double depth_damping,
+                                           std::span<const TargetResidual> inliers)>;
+  void visit_inliers(const WindowLinearization& at, const InlierVisitor& visit) const;
+
   const std::vector<PointRef>& points() const { return points_; }
 
  private:
@@ -161,6 +169,8 @@ class PhotometricProblem {
   void remember_poses();
   bool is_settled(const Block& block, std::size_t point, std::size_t residual, int target,
                   PatternShift* shift) const;
+  bool is_sampled(std::size_t residual) const;
+  PatternShift moved_since(const PointRef& ref, std::size_t residual, int target) const;
   void prepare(const Block& block, std::size_t point, std::size_t residual, int target,
                Step* step) const;
   /// The residual as sampled now, which is kept, or in `moved` as it is by its Jacobian.

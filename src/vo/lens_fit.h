@@ -1,0 +1,29 @@
+#pragma once
+
+#include <optional>
+#include <span>
+
+#include "sovo/geometry/lens_change.h"
+#include "sovo/geometry/types.h"
+
+namespace sovo {
+
+/// What a window shows of its lens, to first order: the energy of its residuals, in units of their
+/// noise, is c^T H c + 2 b^T c in c = (focal, radial), poses, brightnesses and depths being the
+/// best for each c.
+struct LensEvidence {
+  Mat2 H = Mat2::Zero();
+  Vec2 b = Vec2::Zero();
+};
+
+/// A lens as keyframes agree about it, and how sure that is.
+struct LensFit {
+  LensChange change, sigma;
+};
+
+/// Least squares over `keyframes`, in the order in which they were made. What neighbouring
+/// keyframes show is much the same, and errs alike: the standard deviations come from leaving out
+/// one tenth of them after the other (jackknife). Nothing of fewer than ten.
+std::optional<LensFit> fit_lens(std::span<const LensEvidence> keyframes);
+
+}  // namespace sovo

@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <future>
 #include <iostream>
 #include <memory>
@@ -54,12 +55,30 @@ Result<FrameInput> open_input(const AppConfig& config) {
                                     : open_mcap_input(config);
 }
 
+/// Left for right: the odometry follows the other camera.
+StereoCameras exchanged(StereoCameras cameras) {
+  std::swap(cameras.rig.left, cameras.rig.right);
+  cameras.rig.T_right_left = cameras.rig.T_right_left.inverse();
+  std::swap(cameras.left_photometric, cameras.right_photometric);
+  std::swap(cameras.left_mask, cameras.right_mask);
+  return cameras;
+}
+
+StereoFrame exchanged(StereoFrame frame) {
+  std::swap(frame.left, frame.right);
+  frame.pair_error_s = -frame.pair_error_s;
+  return frame;
+}
+
 Result<std::unique_ptr<DirectedRun>> run_direction(const AppConfig& config, const StereoRig& rig,
+                                                   LensSide followed,
                                                    const std::atomic<bool>& stop) {
   auto input = open_input(config);
   if (!input) return input.failure();
+  const bool right = followed == LensSide::kRight;
   StereoCameras cameras = input->cameras;
   cameras.rig = rig;
+  if (right) cameras = exchanged(std::move(cameras));
   auto run = std::make_unique<DirectedRun>();
   StereoOdometry odometry(config.odometry, cameras, &run->collected);
   if (auto begun = input->begin(); !begun) return begun.failure();
@@ -67,7 +86,8 @@ Result<std::unique_ptr<DirectedRun>> run_direction(const AppConfig& config, cons
     const SourceResult next = input->source->next(std::chrono::milliseconds(100));
     if (next.state == SourceState::kFailed) return Error{next.message};
     if (next.state == SourceState::kEndOfStream) break;
-    if (next.state == SourceState::kFrame) odometry.process(next.frame);
+    if (next.state != SourceState::kFrame) continue;
+    odometry.process(right ? exchanged(next.frame) : next.frame);
   }
   odometry.finish();
   run->right_turn = odometry.right_turn();
@@ -75,15 +95,16 @@ Result<std::unique_ptr<DirectedRun>> run_direction(const AppConfig& config, cons
 }
 
 /// Forward and, of a dataset, backwards, at the same time.
-Result<LensPass> run_pass(const AppConfig& config, const StereoRig& rig, StopSignal* stop) {
+Result<LensPass> run_pass(const AppConfig& config, const StereoRig& rig, LensSide followed,
+                          StopSignal* stop) {
   std::atomic<bool> stopped = false;
   std::vector<std::future<Result<std::unique_ptr<DirectedRun>>>> directions;
   for (const bool reverse : {false, true}) {
     if (reverse && !config.camera.mcap.empty()) continue;
     AppConfig directed = config;
     directed.camera.reverse = reverse;
-    directions.push_back(std::async(std::launch::async, [directed, &rig, &stopped] {
-      return run_direction(directed, rig, stopped);
+    directions.push_back(std::async(std::launch::async, [directed, &rig, followed, &stopped] {
+      return run_direction(directed, rig, followed, stopped);
     }));
   }
   LensPass out;
@@ -136,15 +157,14 @@ std::string why_not(const LensRefinement& found) {
          "calibration that is nearer, or record more turns";
 }
 
-int report(const LensRefinement& found, const StereoRig& given, const RefineOptions& options) {
-  if (found.end != LensSearch::kSettled) return fail(kFailed, why_not(found));
-  std::cout << "focal length, left: " << format_fixed(given.left.fx, 3) << " -> "
-            << format_fixed(found.rig.left.fx, 3) << " px (" << percent(found.change.focal)
-            << " +- " << percent(found.sigma.focal) << ")\nradial distortion, left: "
-            << format_fixed(given.left.d[0], 5) << " -> " << format_fixed(found.rig.left.d[0], 5)
-            << " (+- " << format_fixed(found.sigma.radial, 5) << ")\n";
-  const auto written = write_text_file(options.out, format_sovo_calibration(found.rig));
-  return written ? kOk : fail(kFailed, written.error());
+void report(const std::string& side, const LensRefinement& found, const CameraModel& given,
+            const CameraModel& refined) {
+  std::cout << side << ": fx " << format_fixed(given.fx, 3) << " -> "
+            << format_fixed(refined.fx, 3) << " px (" << percent(std::log(refined.fx / given.fx)) << " +- "
+            << percent(found.sigma.focal) << "), first coefficient " << format_fixed(given.d[0], 5)
+            << " -> " << format_fixed(refined.d[0], 5) << " (+- "
+            << format_fixed(found.sigma.radial, 5) << ")\n"
+            << std::flush;
 }
 
 int refine(AppConfig config, const RefineOptions& options) {
@@ -159,15 +179,24 @@ int refine(AppConfig config, const RefineOptions& options) {
   config.odometry.mode = OdometryMode::kScale;
   config.odometry.deterministic = true;
   config.odometry.threads = 1;
-  config.odometry.vo.window.tell_lens = true;
+  config.odometry.vo.window.watch_lens = true;
   const auto input = open_input(config);
   if (!input) return fail(kBadInput, input.error());
   const StereoRig given = input->cameras.rig;
   spdlog::set_level(std::max(spdlog::get_level(), spdlog::level::warn));  // each pass opens it anew
-  const auto found = refine_lens(
-      given, options.passes,
-      [&](const StereoRig& rig) { return run_pass(config, rig, &stop); }, tell_pass);
-  return found ? report(*found, given, options) : fail(kFailed, found.error());
+  const RunLensPass run = [&](const StereoRig& rig, LensSide followed) {
+    return run_pass(config, rig, followed, &stop);
+  };
+  const auto left = refine_lens(given, LensSide::kLeft, options.passes, run, tell_pass);
+  if (!left) return fail(kFailed, left.error());
+  if (left->end != LensSearch::kSettled) return fail(kFailed, why_not(*left));
+  report("left", *left, given.left, left->rig.left);
+  const auto right = refine_lens(left->rig, LensSide::kRight, options.passes, run, tell_pass);
+  if (!right) return fail(kFailed, right.error());
+  if (right->end != LensSearch::kSettled) return fail(kFailed, why_not(*right));
+  report("right", *right, given.right, right->rig.right);
+  const auto written = write_text_file(options.out, format_sovo_calibration(right->rig));
+  return written ? kOk : fail(kFailed, written.error());
 }
 
 }  // namespace

@@ -14,6 +14,8 @@ constexpr double kLeastFocal = 2e-4;
 constexpr double kLeastRadial = 4e-4;
 /// At once the lens is changed by so much at most.
 constexpr double kMostAtOnce = 0.05;
+/// Keyframes err more alike than leaving out tenths of them shows, as measured.
+constexpr double kTooSure = 2.0;
 /// By so much the focal length is wrong on purpose, and so much of it keyframes must see.
 constexpr double kProbe = 0.01;
 constexpr double kLeastSeen = 0.15;
@@ -43,9 +45,14 @@ class StepAcceleration {
   std::optional<std::pair<Vec2, Vec2>> last_;
 };
 
-StereoRig with_lens(const StereoRig& rig, const LensChange& numbers) {
+const CameraModel& camera_of(const StereoRig& rig, LensSide side) {
+  return side == LensSide::kLeft ? rig.left : rig.right;
+}
+
+StereoRig with_lens(const StereoRig& rig, LensSide side, const Vec2& at) {
+  const LensChange numbers = LensChange::of(at);
   StereoRig out = rig;
-  out.left = with_changed_numbers(rig.left, numbers);
+  if (side == LensSide::kLeft) out.left = with_changed_numbers(rig.left, numbers);
   out.right = with_changed_numbers(rig.right, numbers);
   return out;
 }
@@ -70,11 +77,11 @@ SeenNumbers in_numbers(const LensFit& fit, const CameraModel& camera) {
 }
 
 /// Share of a wrong focal length that keyframes see; zero where they tell none.
-Result<double> seen_share(const StereoRig& rig, const Vec2& at, const LensFit& settled,
-                          const RunLensPass& run) {
-  const Mat2 to_numbers = change_of_rays(with_lens(rig, LensChange::of(at)).left).inverse();
-  const Vec2 wrong = at + to_numbers * Vec2(kProbe, 0.0);
-  const auto pass = run(with_lens(rig, LensChange::of(wrong)));
+Result<double> seen_share(const StereoRig& rig, LensSide side, const Vec2& at,
+                          const LensFit& settled, const RunLensPass& run) {
+  const StereoRig found = with_lens(rig, side, at);
+  const Vec2 wrong = at + change_of_rays(camera_of(found, side)).inverse() * Vec2(kProbe, 0.0);
+  const auto pass = run(with_lens(rig, side, wrong), side);
   if (!pass) return pass.failure();
   if (!pass->fit) return 0.0;
   return (settled.change.focal - pass->fit->change.focal) / kProbe;
@@ -83,27 +90,27 @@ Result<double> seen_share(const StereoRig& rig, const Vec2& at, const LensFit& s
 }  // namespace
 
 Result<LensRefinement> refine_lens(
-    const StereoRig& rig, int max_passes, const RunLensPass& run,
+    const StereoRig& rig, LensSide side, int max_passes, const RunLensPass& run,
     const std::function<void(int, const LensChange&, const LensFit&)>& on_pass) {
   LensRefinement out;
   StepAcceleration acceleration;
   Vec2 at = Vec2::Zero();
   while (out.passes < max_passes) {
-    const StereoRig tried = with_lens(rig, LensChange::of(at));
-    const auto pass = run(tried);
+    out.rig = with_lens(rig, side, at);
+    const auto pass = run(out.rig, side);
     if (!pass) return pass.failure();
     ++out.passes;
-    out.rig = tried.turned(pass->right_turn);
+    out.right_turn = pass->right_turn;
     out.change = LensChange::of(at);
     out.end = LensSearch::kUntold;
     if (!pass->fit) return out;
     if (on_pass) on_pass(out.passes, out.change, *pass->fit);
-    const SeenNumbers seen = in_numbers(*pass->fit, tried.left);
+    const SeenNumbers seen = in_numbers(*pass->fit, camera_of(out.rig, side));
     if (!seen.tells_direction()) return out;
     if (seen.is_small()) {
-      const auto share = seen_share(rig, at, *pass->fit, run);
+      const auto share = seen_share(rig, side, at, *pass->fit, run);
       if (!share) return share.failure();
-      out.sigma = LensChange::of(seen.sigma / std::max(*share, 1e-6));
+      out.sigma = LensChange::of(kTooSure * seen.sigma / std::max(*share, 1e-6));
       const bool tells = *share > kLeastSeen && out.sigma.focal < kMostFocalSigma;
       if (tells) out.end = LensSearch::kSettled;
       return out;

@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <cmath>
 #include <iostream>
 
 #include "sovo/app/exit_codes.h"
@@ -32,6 +33,13 @@ void tell_turn(const SO3& turn) {
       "yaw, roll), which was undone: calibrate again, or write a calibration that fits with "
       "--out-calib FILE",
       degrees.x(), degrees.y(), degrees.z());
+}
+
+void tell_focal_error(double error) {
+  spdlog::warn(
+      "the focal length is not as it was calibrated: keyframes see it {:.1f} % {}, which is a part "
+      "of what it is off; find it with sovo calib refine",
+      100.0 * std::abs(error), error > 0.0 ? "longer" : "shorter");
 }
 
 }  // namespace
@@ -80,6 +88,7 @@ int OdometrySession::finish(const StampMap& original_stamp) {
   results.context.threads = config_.odometry.threads;
   results.original_stamp = original_stamp;
   const RunCounts counts = recorder_.counts();
+  if (counts.focal_error != 0.0) tell_focal_error(counts.focal_error);
   std::cout << run_summary(profile_, counts, results.loops) << "\n"
             << timing_table(profile_) << std::flush;
   if (auto written = write_outputs(config_.output, results); !written) {

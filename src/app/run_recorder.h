@@ -22,6 +22,7 @@ struct RunCounts {
   std::map<std::string, std::uint64_t> verdicts;  ///< Scale optimizations by verdict.
   double corner_light = 1.0;                      ///< Of the newest frame.
   std::string state;                              ///< And its state.
+  double focal_error = 0.0;                       ///< Of the newest frame with a pose.
   /// Completion: frames with a valid pose / frames fed.
   double completion() const {
     return fed == 0 ? 0.0 : static_cast<double>(tracked) / static_cast<double>(fed);

@@ -33,7 +33,8 @@ DiagnosticReport describe(const std::string& process_name, const OdometryOutput&
   DiagnosticReport report;
   report.name = process_name;
   report.level = stale ? std::uint8_t{Level::STALE} : diagnostic_level(output.state);
-  if (output.decalibrated && report.level == Level::OK) report.level = Level::WARN;
+  const bool calibrated = !output.decalibrated && output.focal_error == 0.0;
+  if (!calibrated && report.level == Level::OK) report.level = Level::WARN;
   report.text = stale ? "no frames come; last state " : "";
   report.text += to_string(output.state);
   if (!output.reason.empty()) report.text += ": " + output.reason;
@@ -46,6 +47,7 @@ DiagnosticReport describe(const std::string& process_name, const OdometryOutput&
       {"halvings", std::to_string(output.halvings)},
       {"corner_light", std::to_string(output.corner_light)},
       {"right_turn_deg", in_degrees(output.right_turn)},
+      {"focal_error", std::to_string(output.focal_error)},
       {"co_moving_share", std::to_string(output.co_moving_share)},
       {"points", std::to_string(output.points)},
       {"inliers", std::to_string(output.inliers)},

@@ -58,6 +58,8 @@ void judge_frame(const StereoOdometryConfig& config, const FrameTracking& tracki
   } else if (out->decalibrated) {
     out->reason =
         "the right camera is turned against its calibration, which is undone: calibrate again";
+  } else if (out->focal_error != 0.0) {
+    out->reason = "the focal length is not as it was calibrated: find it with sovo calib refine";
   }
 }
 

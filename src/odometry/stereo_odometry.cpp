@@ -18,6 +18,7 @@
 #include "sovo/odometry/recent_places.h"
 #include "sovo/odometry/recognized_tracking.h"
 #include "sovo/odometry/trajectory_recorder.h"
+#include "sovo/vo/lens_fit.h"
 
 namespace sovo {
 
@@ -386,6 +387,7 @@ class StereoOdometry::Impl {
   void publish_keyframes(const MappingOutcome& outcome) {
     for (const KeyframeOutput& k : outcome.keyframes) {
       places_.note(k);
+      if (k.lens) lens_.note(*k.lens);
       sink_->on_keyframe(k);
     }
     const std::lock_guard lock(map_mutex_);
@@ -427,6 +429,7 @@ class StereoOdometry::Impl {
     out->scale_verdict = scale.verdict;
     out->decalibrated = scale.decalibrated;
     out->right_turn = scale.right_turn.log();
+    out->focal_error = lens_.focal_error();
     if (scale.accepted_stamp_ns != 0) {
       out->scale_age_s = kNanosecond * static_cast<double>(out->stamp_ns - scale.accepted_stamp_ns);
     }
@@ -448,6 +451,7 @@ class StereoOdometry::Impl {
   FramePreparation preparation_;
   FrameCheck check_;
   RecentPlaces places_;
+  LensWatch lens_;
   WorkerPool pool_;
 
   std::unique_ptr<MapSegment> segment_;

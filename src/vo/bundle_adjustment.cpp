@@ -389,7 +389,7 @@ BundleResult BundleAdjuster::optimize(Window* window) {
     const double noise = kSharedRight * keyframe_variance(result.rmse, result.gradient_scatter);
     result.scale_variance = config_.static_weight * noise / information;
   }
-  if (config_.tell_lens && window->size() > 2) {
+  if (config_.watch_lens && window->size() > 2) {
     result.lens = lens_evidence(*window, solved, result.rmse * result.rmse);
   }
   drop_bad_residuals(window);

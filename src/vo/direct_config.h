@@ -151,7 +151,7 @@ struct WindowConfig {
   double prior_b = 1.0;                    ///< The same for the bias.
   double min_relative_information = 50.0;  ///< H_rho * mean_rho^2 of a point to be marginalized.
   int min_good_residuals = 3;
-  bool tell_lens = false;  ///< LensEvidence of every bundle adjustment is asked for.
+  bool watch_lens = true;  ///< LensEvidence of every bundle adjustment is asked for.
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -180,7 +180,7 @@ struct WindowConfig {
     v("min_relative_information", min_relative_information,
       "information on a point's log-depth needed to marginalize rather than drop it");
     v("min_good_residuals", min_good_residuals, "residuals needed to marginalize a point");
-    v("tell_lens", tell_lens, "what keyframes tell of the lens is kept (sovo calib refine)");
+    v("watch_lens", watch_lens, "keyframes tell whether the focal length is as it was calibrated");
   }
 };
 

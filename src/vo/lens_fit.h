@@ -1,5 +1,7 @@
 #pragma once
 
+#include <deque>
+#include <mutex>
 #include <optional>
 #include <span>
 
@@ -25,5 +27,21 @@ struct LensFit {
 /// keyframes show is much the same, and errs alike: the standard deviations come from leaving out
 /// one tenth of them after the other (jackknife). Nothing of fewer than ten.
 std::optional<LensFit> fit_lens(std::span<const LensEvidence> keyframes);
+
+/// Tells while the vehicle moves whether the focal length is not the one that was calibrated.
+class LensWatch {
+ public:
+  /// Takes what a keyframe tells.
+  void note(const LensEvidence& keyframe);
+
+  /// How much longer than calibrated keyframes saw the focal length when that was clear last, as a
+  /// logarithm; they see a part of it. 0 while it never was. Any thread may ask.
+  double focal_error() const;
+
+ private:
+  std::deque<LensEvidence> keyframes_;  ///< The newest.
+  mutable std::mutex mutex_;            ///< Of the result.
+  double focal_error_ = 0.0;
+};
 
 }  // namespace sovo

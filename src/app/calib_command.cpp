@@ -192,7 +192,8 @@ int convert_checked(const CalibOptions& options) {
 }  // namespace
 
 void add_calib_command(const Command& program) {
-  const Command command = program.add_command("calib", "Calibration files: show, convert, check, refine");
+  const Command command =
+      program.add_command("calib", "Calibration files: show, convert, check, refine");
   command.require_command();
   const auto options = std::make_shared<CalibOptions>();
 

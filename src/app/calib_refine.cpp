@@ -159,8 +159,8 @@ std::string why_not(const LensRefinement& found) {
 
 void report(const std::string& side, const LensRefinement& found, const CameraModel& given,
             const CameraModel& refined) {
-  std::cout << side << ": fx " << format_fixed(given.fx, 3) << " -> "
-            << format_fixed(refined.fx, 3) << " px (" << percent(std::log(refined.fx / given.fx)) << " +- "
+  std::cout << side << ": fx " << format_fixed(given.fx, 3) << " -> " << format_fixed(refined.fx, 3)
+            << " px (" << percent(std::log(refined.fx / given.fx)) << " +- "
             << percent(found.sigma.focal) << "), first coefficient " << format_fixed(given.d[0], 5)
             << " -> " << format_fixed(refined.d[0], 5) << " (+- "
             << format_fixed(found.sigma.radial, 5) << ")\n"
@@ -179,7 +179,7 @@ int refine(AppConfig config, const RefineOptions& options) {
   config.odometry.mode = OdometryMode::kScale;
   config.odometry.deterministic = true;
   config.odometry.threads = 1;
-  config.odometry.vo.window.watch_lens = true;
+  config.odometry.vo.window.lens_every = 1;
   const auto input = open_input(config);
   if (!input) return fail(kBadInput, input.error());
   const StereoRig given = input->cameras.rig;

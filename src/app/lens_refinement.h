@@ -13,7 +13,7 @@ namespace sovo::app {
 /// What one run over a recording showed.
 struct LensPass {
   std::optional<LensFit> fit;  ///< Of the rays of the camera that was followed, as it was given.
-  SO3 right_turn;  ///< StereoOdometry::right_turn; of the left camera followed.
+  SO3 right_turn;              ///< StereoOdometry::right_turn; of the left camera followed.
 };
 
 enum class LensSide { kLeft, kRight };

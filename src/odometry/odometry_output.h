@@ -90,10 +90,10 @@ struct OdometryOutput {
   Vec3 right_turn = Vec3::Zero();  ///< And by this, about its own axes, which is undone [rad].
   /// LensWatch::focal_error: the focal length is not as it was calibrated.
   double focal_error = 0.0;
-  double co_moving_share = 0.0;    ///< Of the image: moves along with the camera, and is left out.
-  std::uint32_t points = 0;        ///< Active in the window.
-  std::uint32_t inliers = 0;       ///< Pixels of the tracking reference that agree.
-  std::uint32_t keyframes = 0;     ///< In the window.
+  double co_moving_share = 0.0;  ///< Of the image: moves along with the camera, and is left out.
+  std::uint32_t points = 0;      ///< Active in the window.
+  std::uint32_t inliers = 0;     ///< Pixels of the tracking reference that agree.
+  std::uint32_t keyframes = 0;   ///< In the window.
   std::uint32_t queue_depth = 0;
   double sync_error_s = 0.0;
   double residual = 0.0;  ///< RMS of tracking [grey levels; px where features are followed].
@@ -137,7 +137,7 @@ struct KeyframeOutput {
   int halvings = 0;  ///< How often both were halved, unlike `u` and `v`.
   /// Of the size of `left`: 0 where what is seen moves along with the camera; null: nothing does.
   std::shared_ptr<const ImageU8> co_moving_mask;
-  std::optional<LensEvidence> lens;  ///< Where `vo.window.watch_lens` asks for it.
+  std::optional<LensEvidence> lens;  ///< Of one of `vo.window.lens_every`.
 };
 
 /// One run of the scale optimizer, a line of `--keyframes`.

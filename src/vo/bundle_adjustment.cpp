@@ -301,15 +301,15 @@ double BundleAdjuster::scale_information(const WindowLinearization& at,
   return information;
 }
 
-std::optional<LensEvidence> BundleAdjuster::lens_evidence(const Window& window,
-                                                          const NormalEquations& system,
-                                                          double noise) const {
+std::optional<LensEvidence> BundleAdjuster::lens_evidence(const Window& window, double noise) {
+  // The system that was solved last is of other inliers.
+  problem_.linearize(now_, {.statics = false}, &next_);
   LensEquations equations(window);
-  problem_.visit_inliers(now_, [&](const PointRef& ref, double depth_damping,
-                                   std::span<const TargetResidual> inliers) {
+  problem_.visit_inliers(next_, [&](const PointRef& ref, double depth_damping,
+                                    std::span<const TargetResidual> inliers) {
     equations.add(ref.host, *ref.point, depth_damping, inliers);
   });
-  return equations.evidence(system, std::max(noise, 1.0));
+  return equations.evidence(next_.system, std::max(noise, 1.0));
 }
 
 NormalEquations BundleAdjuster::iterate(Window* window, BundleResult* result) {
@@ -389,8 +389,9 @@ BundleResult BundleAdjuster::optimize(Window* window) {
     const double noise = kSharedRight * keyframe_variance(result.rmse, result.gradient_scatter);
     result.scale_variance = config_.static_weight * noise / information;
   }
-  if (config_.watch_lens && window->size() > 2) {
-    result.lens = lens_evidence(*window, solved, result.rmse * result.rmse);
+  const bool lens = config_.lens_every > 0 && window->newest().id % config_.lens_every == 0;
+  if (lens && window->size() > 2) {
+    result.lens = lens_evidence(*window, result.rmse * result.rmse);
   }
   drop_bad_residuals(window);
   return result;

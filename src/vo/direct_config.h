@@ -151,7 +151,7 @@ struct WindowConfig {
   double prior_b = 1.0;                    ///< The same for the bias.
   double min_relative_information = 50.0;  ///< H_rho * mean_rho^2 of a point to be marginalized.
   int min_good_residuals = 3;
-  bool watch_lens = true;  ///< LensEvidence of every bundle adjustment is asked for.
+  int lens_every = 4;  ///< Keyframes of which one tells what it shows of the lens; 0: none does.
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -180,7 +180,8 @@ struct WindowConfig {
     v("min_relative_information", min_relative_information,
       "information on a point's log-depth needed to marginalize rather than drop it");
     v("min_good_residuals", min_good_residuals, "residuals needed to marginalize a point");
-    v("watch_lens", watch_lens, "keyframes tell whether the focal length is as it was calibrated");
+    v("lens_every", lens_every,
+      "one of so many keyframes tells whether the lens is as it was calibrated; 0: none does");
   }
 };
 

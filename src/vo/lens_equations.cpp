@@ -25,16 +25,11 @@ constexpr double kUntold = 1e-5;
 
 }  // namespace
 
-LensEquations::LensEquations(const Window& window)
-    : window_(window), pairs_(static_cast<std::size_t>(kMaxSlots) * kMaxSlots) {}
-
-/// d (u, v) / d (focal, radial) of a point's centre in the target image: its ray leaves the host as
-/// much nearer to the axis as it arrives farther from that.
-Mat2 LensEquations::jacobian(int host, int target, const Point& point) const {
-  const CameraModel& camera = window_.camera();
-  const PairGeometry& g = window_.pair(host, target);
-  const Eigen::Vector3f seen = g.RKi * Eigen::Vector3f(point.u, point.v, 1.0F) +
-                               g.t * static_cast<float>(point.rho);
+Mat2 lens_jacobian(const Window& window, int host, int target, const Point& point) {
+  const CameraModel& camera = window.camera();
+  const PairGeometry& g = window.pair(host, target);
+  const Eigen::Vector3f seen =
+      g.RKi * Eigen::Vector3f(point.u, point.v, 1.0F) + g.t * static_cast<float>(point.rho);
   const double iz = 1.0 / static_cast<double>(seen.z());
   const Vec2 x(seen.x() * iz, seen.y() * iz);
   const Eigen::Vector3f off_centre(point.u - static_cast<float>(camera.cx),
@@ -49,6 +44,9 @@ Mat2 LensEquations::jacobian(int host, int target, const Point& point) const {
   return Vec2(camera.fx, camera.fy).asDiagonal() * out;
 }
 
+LensEquations::LensEquations(const Window& window)
+    : window_(window), pairs_(static_cast<std::size_t>(kMaxSlots) * kMaxSlots) {}
+
 void LensEquations::add(int host, const Point& point, double depth_damping,
                         std::span<const TargetResidual> inliers) {
   std::array<Mat2, kMaxSlots> d;
@@ -58,7 +56,7 @@ void LensEquations::add(int host, const Point& point, double depth_damping,
   for (std::size_t i = 0; i < inliers.size(); ++i) {
     const LinearizedResidual& r = *inliers[i].linearized;
     const DepthPart depth = depth_part(r);
-    d[i] = jacobian(host, inliers[i].target, point);
+    d[i] = lens_jacobian(window_, host, inliers[i].target, point);
     H_rho += static_cast<double>(depth.hessian);
     b_rho += static_cast<double>(depth.gradient);
     H_rho_c += d[i].transpose() * image_gram(r) * Vec2(r.du_rho, r.dv_rho);
@@ -108,8 +106,8 @@ std::optional<LensEvidence> LensEquations::evidence(const NormalEquations& syste
     }
   }
   MatX H = system.top - system.schur;
-  const VecX balance = H.diagonal().unaryExpr(
-      [](double v) { return v > 0.0 ? 1.0 / std::sqrt(v) : 0.0; });
+  const VecX balance =
+      H.diagonal().unaryExpr([](double v) { return v > 0.0 ? 1.0 / std::sqrt(v) : 0.0; });
   H = balance.asDiagonal() * H * balance.asDiagonal();
   H.diagonal().array() += kUntold;
   right = balance.asDiagonal() * right;

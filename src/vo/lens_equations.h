@@ -10,6 +10,10 @@
 
 namespace sovo {
 
+/// d (u, v) / d (focal, radial) of where a target sees the centre of a point: its ray leaves the
+/// host as much nearer to the axis as it arrives farther from that [px].
+Mat2 lens_jacobian(const Window& window, int host, int target, const Point& point);
+
 /// Normal equations of the lens beside those of a window's states: bundle adjustment takes the lens
 /// as given ([D] has its four numbers among the states). Residuals of the window as it is are
 /// asked, and not the prior, into which those that left were folded with the lens as it was taken.
@@ -38,8 +42,6 @@ class LensEquations {
     Mat82 cross = Mat82::Zero();
     Vec8 gradient = Vec8::Zero();
   };
-  Mat2 jacobian(int host, int target, const Point& point) const;
-
   const Window& window_;
   std::vector<Pair> pairs_;
   Mat2 H_ = Mat2::Zero();

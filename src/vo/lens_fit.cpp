@@ -74,8 +74,8 @@ std::optional<LensFit> fit_lens(std::span<const LensEvidence> keyframes) {
 }
 
 void LensWatch::note(const LensEvidence& keyframe) {
-  constexpr std::size_t kFewest = 15;
-  constexpr std::size_t kMost = 100;
+  constexpr std::size_t kFewest = 12;
+  constexpr std::size_t kMost = 60;
   // Keyframes err alike, those of good lenses by up to 0.3 % together.
   constexpr double kClear = 4e-3;
   constexpr double kSigmas = 4.0;

@@ -44,12 +44,6 @@ class LensCollector : public OutputSink {
   bool tracked_ = false;
 };
 
-/// The run of one direction.
-struct DirectedRun {
-  LensCollector collected;
-  SO3 right_turn;
-};
-
 Result<FrameInput> open_input(const AppConfig& config) {
   return config.camera.mcap.empty() ? open_dataset_input(config.camera, 0.0)
                                     : open_mcap_input(config);
@@ -70,17 +64,17 @@ StereoFrame exchanged(StereoFrame frame) {
   return frame;
 }
 
-Result<std::unique_ptr<DirectedRun>> run_direction(const AppConfig& config, const StereoRig& rig,
-                                                   LensSide followed,
-                                                   const std::atomic<bool>& stop) {
+Result<std::unique_ptr<LensCollector>> run_direction(const AppConfig& config, const StereoRig& rig,
+                                                     LensSide followed,
+                                                     const std::atomic<bool>& stop) {
   auto input = open_input(config);
   if (!input) return input.failure();
   const bool right = followed == LensSide::kRight;
   StereoCameras cameras = input->cameras;
   cameras.rig = rig;
   if (right) cameras = exchanged(std::move(cameras));
-  auto run = std::make_unique<DirectedRun>();
-  StereoOdometry odometry(config.odometry, cameras, &run->collected);
+  auto seen = std::make_unique<LensCollector>();
+  StereoOdometry odometry(config.odometry, cameras, seen.get());
   if (auto begun = input->begin(); !begun) return begun.failure();
   while (!stop) {
     const SourceResult next = input->source->next(std::chrono::milliseconds(100));
@@ -90,15 +84,14 @@ Result<std::unique_ptr<DirectedRun>> run_direction(const AppConfig& config, cons
     odometry.process(right ? exchanged(next.frame) : next.frame);
   }
   odometry.finish();
-  run->right_turn = odometry.right_turn();
-  return run;
+  return seen;
 }
 
 /// Forward and, of a dataset, backwards, at the same time.
 Result<LensPass> run_pass(const AppConfig& config, const StereoRig& rig, LensSide followed,
                           StopSignal* stop) {
   std::atomic<bool> stopped = false;
-  std::vector<std::future<Result<std::unique_ptr<DirectedRun>>>> directions;
+  std::vector<std::future<Result<std::unique_ptr<LensCollector>>>> directions;
   for (const bool reverse : {false, true}) {
     if (reverse && !config.camera.mcap.empty()) continue;
     AppConfig directed = config;
@@ -120,12 +113,9 @@ Result<LensPass> run_pass(const AppConfig& config, const StereoRig& rig, LensSid
       done = run.failure();
       continue;
     }
-    const LensCollector& seen = (*run)->collected;
+    const LensCollector& seen = **run;
     evidence.insert(evidence.end(), seen.evidence().begin(), seen.evidence().end());
     tracked |= seen.tracked();
-    if (directions.size() == 1 || &direction == &directions.front()) {
-      out.right_turn = (*run)->right_turn;
-    }
   }
   if (!done) return done.failure();
   if (stopped) return Error{"stopped by the user; nothing was written"};
@@ -193,9 +183,15 @@ int refine(AppConfig config, const RefineOptions& options) {
   report("left", *left, given.left, left->rig.left);
   const auto right = refine_lens(left->rig, LensSide::kRight, options.passes, run, tell_pass);
   if (!right) return fail(kFailed, right.error());
-  if (right->end != LensSearch::kSettled) return fail(kFailed, why_not(*right));
-  report("right", *right, given.right, right->rig.right);
-  const auto written = write_text_file(options.out, format_sovo_calibration(right->rig));
+  if (right->end == LensSearch::kOutOfPasses) return fail(kFailed, why_not(*right));
+  StereoRig refined = left->rig;
+  if (right->end == LensSearch::kSettled) {
+    refined = right->rig;
+    report("right", *right, given.right, refined.right);
+  } else {
+    std::cout << "right: changed as the left one is; the recording does not tell them apart\n";
+  }
+  const auto written = write_text_file(options.out, format_sovo_calibration(refined));
   return written ? kOk : fail(kFailed, written.error());
 }
 

@@ -7,8 +7,10 @@
 namespace sovo::app {
 namespace {
 
-/// A recording that leaves the focal length more uncertain (a logarithm) does not tell it.
+/// A recording that leaves the focal length more uncertain (a logarithm) does not tell it, unless
+/// it is off by ten times that.
 constexpr double kMostFocalSigma = 3e-3;
+constexpr double kMostOfChange = 0.1;
 /// Less is not worth another pass.
 constexpr double kLeastFocal = 2e-4;
 constexpr double kLeastRadial = 4e-4;
@@ -100,7 +102,6 @@ Result<LensRefinement> refine_lens(
     const auto pass = run(out.rig, side);
     if (!pass) return pass.failure();
     ++out.passes;
-    out.right_turn = pass->right_turn;
     out.change = LensChange::of(at);
     out.end = LensSearch::kUntold;
     if (!pass->fit) return out;
@@ -111,7 +112,8 @@ Result<LensRefinement> refine_lens(
       const auto share = seen_share(rig, side, at, *pass->fit, run);
       if (!share) return share.failure();
       out.sigma = LensChange::of(kTooSure * seen.sigma / std::max(*share, 1e-6));
-      const bool tells = *share > kLeastSeen && out.sigma.focal < kMostFocalSigma;
+      const double most = std::max(kMostFocalSigma, kMostOfChange * std::abs(out.change.focal));
+      const bool tells = *share > kLeastSeen && out.sigma.focal < most;
       if (tells) out.end = LensSearch::kSettled;
       return out;
     }

@@ -13,7 +13,6 @@ namespace sovo::app {
 /// What one run over a recording showed.
 struct LensPass {
   std::optional<LensFit> fit;  ///< Of the rays of the camera that was followed, as it was given.
-  SO3 right_turn;              ///< StereoOdometry::right_turn; of the left camera followed.
 };
 
 enum class LensSide { kLeft, kRight };
@@ -33,7 +32,6 @@ struct LensRefinement {
   LensSearch end = LensSearch::kOutOfPasses;
   StereoRig rig;
   LensChange change, sigma;  ///< Of the camera's numbers; `sigma` where it has settled.
-  SO3 right_turn;            ///< As the last pass found it.
   int passes = 0;
 };
 

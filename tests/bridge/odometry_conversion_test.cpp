@@ -188,6 +188,16 @@ TEST(Diagnostics, WarnOfARightCameraThatIsTurned) {
   EXPECT_EQ(describe("", output, {}).level, Level::ERROR);
 }
 
+TEST(Diagnostics, WarnOfAnotherFocalLength) {
+  using Level = MessageTraits<msg::DiagnosticStatus>;
+  OdometryOutput output = test_output();
+  output.state = OdometryState::kTracking;
+  EXPECT_EQ(value_of(describe("", output, {}), "focal_error"), "0.000000");
+  output.focal_error = -0.0125;
+  EXPECT_EQ(describe("", output, {}).level, Level::WARN);
+  EXPECT_EQ(value_of(describe("", output, {}), "focal_error"), "-0.012500");
+}
+
 TEST(Diagnostics, SayHowMuchLightTheCornersWereFoundToHave) {
   OdometryOutput output = test_output();
   EXPECT_EQ(value_of(describe("", output, {}), "corner_light"), "1.000000");

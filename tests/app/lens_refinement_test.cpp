@@ -86,6 +86,7 @@ TEST(LensRefinement, ChangesNothingWhereTheLensFits) {
 TEST(LensRefinement, IsNotTakenInByARecordingThatTellsNothing) {
   Recording recording;
   recording.seen_focal = 0.05;  // of a plane that a camera turns above
+  recording.sigma.focal = 2e-5;
   const auto found = recording.refine(true_rig(), LensSide::kLeft);
   ASSERT_TRUE(found.ok());
   EXPECT_EQ(found->end, LensSearch::kUntold);

@@ -33,8 +33,7 @@ DiagnosticReport describe(const std::string& process_name, const OdometryOutput&
   DiagnosticReport report;
   report.name = process_name;
   report.level = stale ? std::uint8_t{Level::STALE} : diagnostic_level(output.state);
-  const bool calibrated = !output.decalibrated && output.focal_error == 0.0;
-  if (!calibrated && report.level == Level::OK) report.level = Level::WARN;
+  if (output.decalibrated && report.level == Level::OK) report.level = Level::WARN;
   report.text = stale ? "no frames come; last state " : "";
   report.text += to_string(output.state);
   if (!output.reason.empty()) report.text += ": " + output.reason;

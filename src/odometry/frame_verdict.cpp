@@ -24,7 +24,7 @@ bool scale_is_old(const StereoOdometryConfig& config, const OdometryOutput& out)
 }
 
 std::string why_degraded(const StereoOdometryConfig& config, const FrameTracking& tracking,
-                         double sigma, const std::string& right_problem) {
+                         double sigma, double focal_error, const std::string& right_problem) {
   if (!right_problem.empty()) return right_problem + "; the scale is not measured";
   if (tracking.good && tracking.inlier_ratio < degraded_inliers(config.backend)) {
     return "only " + std::to_string(static_cast<int>(100.0 * tracking.inlier_ratio)) +
@@ -39,6 +39,10 @@ std::string why_degraded(const StereoOdometryConfig& config, const FrameTracking
            "vehicle itself, hide that with a mask";
   }
   if (!(sigma <= kDegradedSigma)) return "the image tells too little of where the camera is";
+  // Ways are too long or too short by more than any covariance says.
+  if (focal_error != 0.0) {
+    return "the focal length is not as it was calibrated: find it with sovo calib refine";
+  }
   return "";
 }
 
@@ -49,7 +53,7 @@ void judge_frame(const StereoOdometryConfig& config, const FrameTracking& tracki
   const double sigma = mean_rho * std::sqrt(out->frame_covariance.topLeftCorner<3, 3>().trace());
   const bool scaled = config.mode != OdometryMode::kMono;
   out->state = OdometryState::kTracking;
-  out->reason = why_degraded(config, tracking, sigma, right_problem);
+  out->reason = why_degraded(config, tracking, sigma, out->focal_error, right_problem);
   if (!out->reason.empty()) {
     out->state = OdometryState::kDegraded;
   } else if (scaled && (!out->scale_valid || scale_is_old(config, *out))) {
@@ -58,8 +62,6 @@ void judge_frame(const StereoOdometryConfig& config, const FrameTracking& tracki
   } else if (out->decalibrated) {
     out->reason =
         "the right camera is turned against its calibration, which is undone: calibrate again";
-  } else if (out->focal_error != 0.0) {
-    out->reason = "the focal length is not as it was calibrated: find it with sovo calib refine";
   }
 }
 

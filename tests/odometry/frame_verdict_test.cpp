@@ -116,11 +116,13 @@ TEST(FrameVerdict, ATurnedRightCameraIsToldWhereNothingIsWorse) {
   EXPECT_EQ(frame.out.reason.find("calibrate again"), std::string::npos);
 }
 
-TEST(FrameVerdict, AnotherFocalLengthIsToldWhereNothingIsWorse) {
+TEST(FrameVerdict, WithAnotherFocalLengthPosesAreNotGood) {
   Judged frame;
   frame.out.focal_error = -0.01;
-  EXPECT_EQ(frame.state(), OdometryState::kTracking);
+  EXPECT_EQ(frame.state(), OdometryState::kDegraded);
   EXPECT_NE(frame.out.reason.find("sovo calib refine"), std::string::npos);
+  frame.out.decalibrated = true;
+  EXPECT_EQ(frame.state(), OdometryState::kDegraded) << "that is undone, this is not";
   frame.tracking.inlier_ratio = 0.6;
   EXPECT_EQ(frame.state(), OdometryState::kDegraded);
   EXPECT_EQ(frame.out.reason.find("sovo calib refine"), std::string::npos);

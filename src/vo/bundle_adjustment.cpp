@@ -301,15 +301,18 @@ double BundleAdjuster::scale_information(const WindowLinearization& at,
   return information;
 }
 
-std::optional<LensEvidence> BundleAdjuster::lens_evidence(const Window& window, double noise) {
-  // The system that was solved last is of other inliers.
-  problem_.linearize(now_, {.statics = false}, &next_);
+bool BundleAdjuster::tells_lens(const Window& window) const {
+  return config_.lens_every > 0 && window.size() > 2 &&
+         window.newest().id % config_.lens_every == 0;
+}
+
+std::optional<LensEvidence> BundleAdjuster::lens_evidence(const Window& window) {
   LensEquations equations(window);
-  problem_.visit_inliers(next_, [&](const PointRef& ref, double depth_damping,
-                                    std::span<const TargetResidual> inliers) {
+  problem_.visit_inliers(now_, [&](const PointRef& ref, double depth_damping,
+                                   std::span<const TargetResidual> inliers) {
     equations.add(ref.host, *ref.point, depth_damping, inliers);
   });
-  return equations.evidence(next_.system, std::max(noise, 1.0));
+  return equations.evidence(now_.system);
 }
 
 NormalEquations BundleAdjuster::iterate(Window* window, BundleResult* result) {
@@ -331,7 +334,8 @@ NormalEquations BundleAdjuster::iterate(Window* window, BundleResult* result) {
     // Moves nothing by more than some hundredths of a pixel: not worth another linearization.
     if (converged && lambda <= config_.damping) break;
     const bool last = converged || i + 1 == max_iterations;
-    problem_.linearize(now_, {.system = !last}, &next_);
+    // The lens is told by the system of the inliers as they are in the end.
+    problem_.linearize(now_, {.system = !last || tells_lens(*window)}, &next_);
     const double new_energy = next_.energy + prior_energy(*window);
     if (new_energy < energy) {
       energy = new_energy;
@@ -363,6 +367,7 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   const std::vector<SE3> before = window->poses();
   const NormalEquations solved = iterate(window, &result);
   if (!result.finite) return result;
+  if (tells_lens(*window)) result.lens = lens_evidence(*window);
 
   window->newest().freeze();
   const MatX H = reduced(*window, solved, 0.0).H;
@@ -389,10 +394,7 @@ BundleResult BundleAdjuster::optimize(Window* window) {
     const double noise = kSharedRight * keyframe_variance(result.rmse, result.gradient_scatter);
     result.scale_variance = config_.static_weight * noise / information;
   }
-  const bool lens = config_.lens_every > 0 && window->newest().id % config_.lens_every == 0;
-  if (lens && window->size() > 2) {
-    result.lens = lens_evidence(*window, result.rmse * result.rmse);
-  }
+  if (result.lens) result.lens->weigh(1.0 / std::max(result.rmse * result.rmse, 1.0));
   drop_bad_residuals(window);
   return result;
 }

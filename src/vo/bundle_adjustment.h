@@ -104,7 +104,9 @@ class BundleAdjuster {
   /// last system that was solved.
   NormalEquations iterate(Window* window, BundleResult* result);
   void drop_bad_residuals(Window* window) const;
-  std::optional<LensEvidence> lens_evidence(const Window& window, double noise);
+  bool tells_lens(const Window& window) const;
+  /// For residuals of unit noise. Before linearization points move.
+  std::optional<LensEvidence> lens_evidence(const Window& window);
   /// What static residuals that are inliers tell of a common factor of all depths.
   static double scale_information(const WindowLinearization& at,
                                   const std::vector<PointRef>& points);

@@ -89,8 +89,7 @@ void LensEquations::add(int host, const Point& point, double depth_damping,
   }
 }
 
-std::optional<LensEvidence> LensEquations::evidence(const NormalEquations& system,
-                                                    double noise) const {
+std::optional<LensEvidence> LensEquations::evidence(const NormalEquations& system) const {
   const int n = window_.size();
   // J_x^T [J_c, r] of the states.
   MatX right = MatX::Zero(Eigen::Index{8} * n, 3);
@@ -113,8 +112,8 @@ std::optional<LensEvidence> LensEquations::evidence(const NormalEquations& syste
   right = balance.asDiagonal() * right;
   const MatX solved = solve_symmetric_columns(H, right);
   LensEvidence out;
-  out.H = (H_ - right.leftCols<2>().transpose() * solved.leftCols<2>()) / noise;
-  out.b = (b_ - right.leftCols<2>().transpose() * solved.col(2)) / noise;
+  out.H = H_ - right.leftCols<2>().transpose() * solved.leftCols<2>();
+  out.b = b_ - right.leftCols<2>().transpose() * solved.col(2);
   const bool tells = out.H.allFinite() && out.b.allFinite() && out.H(0, 0) > 0.0 &&
                      out.H(1, 1) > 0.0 && out.H.determinant() > 0.0;
   return tells ? std::optional(out) : std::nullopt;

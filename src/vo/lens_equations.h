@@ -30,9 +30,9 @@ class LensEquations {
   void add(int host, const Point& point, double depth_damping,
            std::span<const TargetResidual> inliers);
 
-  /// Eliminates poses and brightnesses, of which `system` has the normal equations without any
-  /// prior. `noise`: variance of residuals. Nothing where that tells nothing.
-  std::optional<LensEvidence> evidence(const NormalEquations& system, double noise) const;
+  /// Eliminates poses and brightnesses, of which `system` has the normal equations of the same
+  /// inliers, without any prior. For residuals of unit noise; nothing where that tells nothing.
+  std::optional<LensEvidence> evidence(const NormalEquations& system) const;
 
  private:
   using Mat82 = Eigen::Matrix<double, 8, 2>;

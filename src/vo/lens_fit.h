@@ -16,6 +16,11 @@ namespace sovo {
 struct LensEvidence {
   Mat2 H = Mat2::Zero();
   Vec2 b = Vec2::Zero();
+
+  void weigh(double factor) {
+    H *= factor;
+    b *= factor;
+  }
 };
 
 /// A lens as keyframes agree about it, and how sure that is.

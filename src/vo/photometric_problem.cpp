@@ -35,15 +35,26 @@ void store(const LinearizedResidual& r, StoredResidual* out) {
   out->textured = is_textured(r);
 }
 
-/// In single precision, as residuals want them.
-std::vector<std::array<float, 8>> rounded(const std::vector<Vec8>& displacements) {
-  std::vector<std::array<float, 8>> out(displacements.size());
-  for (std::size_t i = 0; i < out.size(); ++i) {
+/// In single precision, as residuals want them, in the memory of what `out` was.
+void round_to(const std::vector<Vec8>& displacements, std::vector<std::array<float, 8>>* out) {
+  out->resize(displacements.size());
+  for (std::size_t i = 0; i < out->size(); ++i) {
     for (std::size_t k = 0; k < 8; ++k) {
-      out[i][k] = static_cast<float>(displacements[i][static_cast<Eigen::Index>(k)]);
+      (*out)[i][k] = static_cast<float>(displacements[i][static_cast<Eigen::Index>(k)]);
     }
   }
-  return out;
+}
+
+/// `relative_displacements` in the memory of what `out` was.
+void displace_pairs(const Window& window, const VecX& x, std::vector<Vec8>* out) {
+  out->assign(static_cast<std::size_t>(kMaxSlots) * kMaxSlots, Vec8::Zero());
+  for (int h = 0; h < window.size(); ++h) {
+    for (int t = 0; t < window.size(); ++t) {
+      if (h == t) continue;
+      (*out)[pair_index(h, t)] =
+          x.segment<8>(8 * t) + window.pair(h, t).adjoint_host * x.segment<8>(8 * h);
+    }
+  }
 }
 
 }  // namespace
@@ -58,14 +69,8 @@ std::vector<PointRef> collect_points(Window* window) {
 }
 
 std::vector<Vec8> relative_displacements(const Window& window, const VecX& x) {
-  std::vector<Vec8> relative(static_cast<std::size_t>(kMaxSlots) * kMaxSlots, Vec8::Zero());
-  for (int h = 0; h < window.size(); ++h) {
-    for (int t = 0; t < window.size(); ++t) {
-      if (h == t) continue;
-      relative[pair_index(h, t)] =
-          x.segment<8>(8 * t) + window.pair(h, t).adjoint_host * x.segment<8>(8 * h);
-    }
-  }
+  std::vector<Vec8> relative;
+  displace_pairs(window, x, &relative);
   return relative;
 }
 
@@ -139,9 +144,10 @@ void PhotometricProblem::stored(WindowLinearization* out) const {
 
 void PhotometricProblem::remember_poses() {
   states_.push_back(window_->stacked_x());
-  moved_.resize(states_.size());
+  if (moved_.size() < states_.size()) moved_.resize(states_.size());
   for (std::size_t i = 0; i < states_.size(); ++i) {
-    moved_[i] = rounded(relative_displacements(*window_, states_.back() - states_[i]));
+    displace_pairs(*window_, states_.back() - states_[i], &displaced_);
+    round_to(displaced_, &moved_[i]);
   }
 }
 
@@ -354,7 +360,8 @@ void PhotometricProblem::reclassify(WindowLinearization* at) const {
 }
 
 void PhotometricProblem::step_depths(const WindowLinearization& at, const VecX& dx, double lambda) {
-  const auto steps = rounded(relative_displacements(*window_, dx));
+  displace_pairs(*window_, dx, &displaced_);
+  round_to(displaced_, &steps_);
   for (const Block& block : blocks_) {
     for (std::size_t i = block.begin; i < block.end; ++i) {
       const PointDepth& depth = at.depths[i];
@@ -363,7 +370,7 @@ void PhotometricProblem::step_depths(const WindowLinearization& at, const VecX& 
       for (std::size_t k = first_[i]; k < first_[i + 1]; ++k) {
         const StoredResidual& r = at.residuals[k];
         if (r.state != ResidualState::kIn) continue;
-        const std::array<float, 8>& step = steps[pair_index(block.host, r.target)];
+        const std::array<float, 8>& step = steps_[pair_index(block.host, r.target)];
         b += static_cast<double>(sum_lane(load_lane(&r.cross[0]) * load_lane(&step[0]) +
                                           load_lane(&r.cross[4]) * load_lane(&step[4])));
       }
@@ -394,8 +401,8 @@ double PhotometricProblem::gradient_scatter(const WindowLinearization& at, int t
   return squared_gradients / (variance * hessians);
 }
 
-void PhotometricProblem::visit_inliers(const WindowLinearization& at,
-                                       const InlierVisitor& visit) const {
+void PhotometricProblem::visit_inliers(const WindowLinearization& at, const InlierVisitor& visit) {
+  if (states_.back() != window_->stacked_x()) remember_poses();
   std::array<LinearizedResidual, kMaxSlots> moved;
   std::array<TargetResidual, kMaxSlots> inliers;
   for (std::size_t i = 0; i < points_.size(); ++i) {

@@ -150,7 +150,7 @@ class PhotometricProblem {
   /// `at`: as linearized last.
   using InlierVisitor = std::function<void(const PointRef& point, double depth_damping,
                                            std::span<const TargetResidual> inliers)>;
-  void visit_inliers(const WindowLinearization& at, const InlierVisitor& visit) const;
+  void visit_inliers(const WindowLinearization& at, const InlierVisitor& visit);
 
   const std::vector<PointRef>& points() const { return points_; }
 
@@ -199,8 +199,10 @@ class PhotometricProblem {
   AlignedVector<SampledResidual> sampled_;          ///< Every residual, and memory for more.
   AlignedVector<SampledResidual> sampled_statics_;  ///< Of each point, and memory for more.
   std::vector<VecX> states_;                        ///< Of the keyframes, at each linearization.
-  /// Relative displacement of each pair since each linearization.
+  /// Relative displacement of each pair since each linearization, and memory for more.
   std::vector<std::vector<std::array<float, 8>>> moved_;
+  std::vector<std::array<float, 8>> steps_;  ///< The same of a step.
+  std::vector<Vec8> displaced_;              ///< For its memory alone.
   std::vector<Vec8> shifts_;  ///< From the frozen poses to the current ones, for `at_frozen_poses`.
 };
 

@@ -307,12 +307,14 @@ bool BundleAdjuster::tells_lens(const Window& window) const {
 }
 
 std::optional<LensEvidence> BundleAdjuster::lens_evidence(const Window& window) {
+  // The last step may have been taken back, or have been too small for another linearization.
+  problem_.linearize(now_, {.statics = false}, &next_);
   LensEquations equations(window);
-  problem_.visit_inliers(now_, [&](const PointRef& ref, double depth_damping,
-                                   std::span<const TargetResidual> inliers) {
+  problem_.visit_inliers(next_, [&](const PointRef& ref, double depth_damping,
+                                    std::span<const TargetResidual> inliers) {
     equations.add(ref.host, *ref.point, depth_damping, inliers);
   });
-  return equations.evidence(now_.system);
+  return equations.evidence(next_.system);
 }
 
 NormalEquations BundleAdjuster::iterate(Window* window, BundleResult* result) {
@@ -334,8 +336,7 @@ NormalEquations BundleAdjuster::iterate(Window* window, BundleResult* result) {
     // Moves nothing by more than some hundredths of a pixel: not worth another linearization.
     if (converged && lambda <= config_.damping) break;
     const bool last = converged || i + 1 == max_iterations;
-    // The lens is told by the system of the inliers as they are in the end.
-    problem_.linearize(now_, {.system = !last || tells_lens(*window)}, &next_);
+    problem_.linearize(now_, {.system = !last}, &next_);
     const double new_energy = next_.energy + prior_energy(*window);
     if (new_energy < energy) {
       energy = new_energy;

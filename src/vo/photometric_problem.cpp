@@ -401,8 +401,8 @@ double PhotometricProblem::gradient_scatter(const WindowLinearization& at, int t
   return squared_gradients / (variance * hessians);
 }
 
-void PhotometricProblem::visit_inliers(const WindowLinearization& at, const InlierVisitor& visit) {
-  if (states_.back() != window_->stacked_x()) remember_poses();
+void PhotometricProblem::visit_inliers(const WindowLinearization& at,
+                                       const InlierVisitor& visit) const {
   std::array<LinearizedResidual, kMaxSlots> moved;
   std::array<TargetResidual, kMaxSlots> inliers;
   for (std::size_t i = 0; i < points_.size(); ++i) {

@@ -147,10 +147,10 @@ class PhotometricProblem {
   double gradient_scatter(const WindowLinearization& at, int target) const;
 
   /// Of each point the inliers, moved to the present estimate, and what was added to its H_rho.
-  /// `at`: as linearized last.
+  /// `at`: as linearized last, at the present estimate.
   using InlierVisitor = std::function<void(const PointRef& point, double depth_damping,
                                            std::span<const TargetResidual> inliers)>;
-  void visit_inliers(const WindowLinearization& at, const InlierVisitor& visit);
+  void visit_inliers(const WindowLinearization& at, const InlierVisitor& visit) const;
 
   const std::vector<PointRef>& points() const { return points_; }
 

@@ -15,6 +15,7 @@
 #include "sovo/app/frame_input.h"
 #include "sovo/app/lens_refinement.h"
 #include "sovo/app/mcap_input.h"
+#include "sovo/app/run_outputs.h"
 #include "sovo/app/stop_signal.h"
 #include "sovo/io/calibration.h"
 #include "sovo/io/text.h"
@@ -164,6 +165,9 @@ int refine(AppConfig config, const RefineOptions& options) {
   if (config.odometry.backend != Backend::kDirect) {
     return fail(kUsage, "the lens is refined with backend: direct");
   }
+  OutputSection output;
+  output.calibration = options.out;
+  if (auto writable = check_outputs(output); !writable) return fail(kUsage, writable.error());
   StopSignal stop;
   config.camera.rate = "max";
   config.odometry.mode = OdometryMode::kScale;

@@ -67,6 +67,9 @@ class CalibRefine(CommandTest):
         self.expect(sovo("calib", "refine", "--dataset", self.folder / "none", "--out", self.out),
                     BAD_INPUT)
         self.expect(sovo("calib", "refine", "--dataset", self.folder), USAGE)  # without --out
+        # Before minutes are spent.
+        self.expect(sovo("calib", "refine", "--dataset", self.folder, "--out",
+                         self.folder / "none" / "refined.yaml"), USAGE)
         by_features = self.folder / "features.yaml"
         by_features.write_text("backend: features\n")
         result = sovo("calib", "refine", "--dataset", self.folder, "--out", self.out, "--config",

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <cstdint>
 #include <future>
 #include <iostream>
 #include <memory>
@@ -61,7 +62,10 @@ StereoCameras exchanged(StereoCameras cameras) {
 
 StereoFrame exchanged(StereoFrame frame) {
   std::swap(frame.left, frame.right);
-  frame.pair_error_s = -frame.pair_error_s;
+  const std::int64_t later = frame.left.stamp_offset_ns;
+  frame.stamp_ns += later;
+  frame.left.stamp_offset_ns -= later;
+  frame.right.stamp_offset_ns -= later;
   return frame;
 }
 

@@ -28,6 +28,10 @@ void TrajectoryRecorder::add(const TrackedFrame& tracked) {
 void TrajectoryRecorder::compose(const std::vector<KeyframePose>& keyframes,
                                  std::vector<TrajectoryPose>* out) const {
   const std::vector<SE3> poses = refined_keyframe_poses(keyframes);
+  // A frame that was tracked in the segment before, too, counts where it begins this one.
+  if (!out->empty() && !frames_.empty() && out->back().stamp_ns == frames_.front().stamp_ns) {
+    out->pop_back();
+  }
   // A frame that became a keyframe has the keyframe's pose.
   std::size_t next = 0;
   for (const FrameRecord& f : frames_) {

@@ -14,7 +14,8 @@ class TrajectoryRecorder {
   /// A tracked frame of the segment at hand.
   void add(const TrackedFrame& tracked);
 
-  /// Appends the frames of the segment at hand to `out` with their keyframes' poses.
+  /// Appends the frames of the segment at hand to `out` with their keyframes' poses. Each stamp is
+  /// there once.
   void compose(const std::vector<KeyframePose>& keyframes, std::vector<TrajectoryPose>* out) const;
 
   /// Closes the segment at hand: its frames get their poses for good.

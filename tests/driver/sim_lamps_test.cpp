@@ -91,14 +91,14 @@ TEST(LampsTest, InTheDarkOnlyTheBeamIsSeen) {
   const Scene scene = build_scene(config.world, motion, 1);
   const StereoRig rig = vehicle_rig();
   LampConfig lamp = one_lamp();
-  lamp.ambient = 0.0;
   lamp.beam_deg = 20.0;
   const SE3 pose = motion.at(6.0);
   RenderedImage day;
   RenderedImage night;
   Renderer(scene, rig.left).render(pose, 6.0, &day);
-  Renderer(scene, rig.left, place_lamps(lamp, rig, Side::kLeft, scene.haze))
-      .render(pose, 6.0, &night);
+  Renderer by_lamp(scene, rig.left, place_lamps(lamp, rig, Side::kLeft, scene.haze));
+  by_lamp.set_daylight(0.0F);
+  by_lamp.render(pose, 6.0, &night);
   EXPECT_TRUE(
       std::equal(day.range.data(), day.range.data() + day.range.size(), night.range.data()));
   const auto mean = [](const ImageF& image, int x0, int y0) {
@@ -110,6 +110,60 @@ TEST(LampsTest, InTheDarkOnlyTheBeamIsSeen) {
   };
   EXPECT_GT(mean(day.light, 4, 4), 0.01);
   EXPECT_LT(mean(night.light, 4, 4), 0.02 * mean(night.light, 72, 48));
+}
+
+TEST(LampsTest, DaylightGoesAsOneDivesAndReturns) {
+  LampConfig lamps = one_lamp();
+  lamps.ambient = 0.01;
+  EXPECT_FLOAT_EQ(share_of_daylight(lamps, 0.0), 0.01F);
+  EXPECT_FLOAT_EQ(share_of_daylight(lamps, 1e3), 0.01F);
+  lamps.ambient_from_s = 2.0;
+  lamps.ambient_until_s = 10.0;
+  EXPECT_FLOAT_EQ(share_of_daylight(lamps, 1.9), 1.0F);
+  EXPECT_FLOAT_EQ(share_of_daylight(lamps, 2.0), 0.01F);
+  EXPECT_FLOAT_EQ(share_of_daylight(lamps, 10.0), 1.0F);
+  lamps.fade_s = 4.0;
+  EXPECT_FLOAT_EQ(share_of_daylight(lamps, 2.0), 1.0F);
+  EXPECT_NEAR(share_of_daylight(lamps, 4.0), 0.1, 1e-6);
+  EXPECT_NEAR(share_of_daylight(lamps, 6.0), 0.01, 1e-7);
+  EXPECT_NEAR(share_of_daylight(lamps, 12.0), 0.1, 1e-6);
+  EXPECT_FLOAT_EQ(share_of_daylight(lamps, 14.0), 1.0F);
+  lamps.ambient_until_s = 4.0;  // rises again before it is dark
+  EXPECT_NEAR(share_of_daylight(lamps, 5.0), 0.1, 1e-6);
+  EXPECT_FLOAT_EQ(share_of_daylight(lamps, 8.0), 1.0F);
+  lamps.count = 0;
+  EXPECT_FLOAT_EQ(share_of_daylight(lamps, 4.0), 1.0F);
+}
+
+TEST(LampsTest, ADiveLeadsFromDaylightIntoTheDark) {
+  SimConfig config;
+  config.world = World::kPool;
+  config.frames = 3;
+  config.frame_rate = 20.0;
+  config.threads = 1;
+  config.own_body = Body::kArms;
+  config.lamps.count = 2;
+  config.lamps.ambient = 0.05;
+  const auto frames_of = [&](double from_s, double until_s) {
+    config.lamps.ambient_from_s = from_s;
+    config.lamps.ambient_until_s = until_s;
+    auto source = open_sim(config);
+    EXPECT_TRUE(source) << source.error();
+    std::vector<std::vector<std::uint8_t>> images;
+    for (int i = 0; i < 3; ++i) {
+      const auto result = (*source)->next(std::chrono::seconds(20));
+      images.push_back(*result.frame.right.data);
+    }
+    return images;
+  };
+  config.sensor.auto_exposure = false;
+  const auto day = frames_of(1e6, 1e9);
+  const auto dark = frames_of(0.0, 1e9);
+  const auto dive = frames_of(0.04, 0.08);
+  EXPECT_NE(day[1], dark[1]);
+  EXPECT_EQ(dive[0], day[0]);
+  EXPECT_EQ(dive[1], dark[1]);
+  EXPECT_EQ(dive[2], day[2]);
 }
 
 TEST(LampsTest, WrongLampsAreRefused) {
@@ -124,6 +178,14 @@ TEST(LampsTest, WrongLampsAreRefused) {
   EXPECT_NE(refused([](LampConfig* l) { l->above_m = 1e9; }).find("above"), std::string::npos);
   EXPECT_NE(refused([](LampConfig* l) { l->beam_deg = 0; }).find("beam_deg"), std::string::npos);
   EXPECT_NE(refused([](LampConfig* l) { l->ambient = 2; }).find("ambient"), std::string::npos);
+  EXPECT_NE(refused([](LampConfig* l) { l->ambient_from_s = -1; }).find("ambient_from_s"),
+            std::string::npos);
+  EXPECT_NE(refused([](LampConfig* l) {
+              l->ambient_from_s = 2;
+              l->ambient_until_s = 1;
+            }).find("ambient_until_s"),
+            std::string::npos);
+  EXPECT_NE(refused([](LampConfig* l) { l->fade_s = -1; }).find("fade_s"), std::string::npos);
   EXPECT_NE(refused([](LampConfig* l) { l->backscatter = -1; }).find("backscatter"),
             std::string::npos);
 }

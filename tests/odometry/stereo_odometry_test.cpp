@@ -77,6 +77,11 @@ TEST(StereoOdometry, LampsThatMoveWithTheCamerasAreFoundAndANewSegmentGoesOn) {
     EXPECT_EQ(said, 1);
     EXPECT_EQ(frames.back().segment, 1U);
     expect_follows_the_drive(published(run.recorder), 0.03, 0.05);
+    const std::vector<TrajectoryPose> refined = run.odometry.refined_trajectory();
+    ASSERT_EQ(refined.size(), frames.size()) << "a pose for each stamp, also where segments meet";
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      EXPECT_EQ(refined[i].stamp_ns, frames[i].stamp_ns);
+    }
   }
 }
 

@@ -191,5 +191,23 @@ TEST(TrajectoryRecorder, ClosedSegmentsStay) {
   EXPECT_EQ(recorder.trajectory(nullptr).size(), 1U);
 }
 
+TEST(TrajectoryRecorder, AFrameOfTwoSegmentsBelongsToTheOneThatItBegins) {
+  TrajectoryRecorder recorder;
+  recorder.add(tracked(100, 0, SE3(), 0.0));
+  recorder.add(tracked(150, 0, at(-0.5), 0.0));
+  recorder.close_segment({keyframe(0, at(3))});
+  KeyframePose k = keyframe(0, at(3.6));
+  k.stamp_ns = 150;
+  recorder.add(tracked(150, 0, SE3(), 0.0));
+  recorder.add(tracked(200, 0, at(-0.5), 0.0));
+  recorder.close_segment({k});
+  const auto trajectory = recorder.trajectory(nullptr);
+  ASSERT_EQ(trajectory.size(), 3U);
+  EXPECT_EQ(trajectory[0].stamp_ns, 100);
+  EXPECT_EQ(trajectory[1].stamp_ns, 150);
+  EXPECT_EQ(trajectory[1].T_odom_left.translation().x(), 3.6);
+  EXPECT_EQ(trajectory[2].stamp_ns, 200);
+}
+
 }  // namespace
 }  // namespace sovo

@@ -92,12 +92,21 @@ Lamps place_lamps(const LampConfig& config, const StereoRig& rig, Side side, dou
     lamps.lamps.push_back({position.cast<float>(), axis.cast<float>()});
   }
   const double half = 0.5 * config.beam_deg * std::numbers::pi / 180.0;
-  lamps.ambient = static_cast<float>(config.ambient);
   lamps.power = 1.0F / static_cast<float>(config.count);
   lamps.sharpness = static_cast<float>(std::numbers::ln2 / (1.0 - std::cos(half)));
   lamps.haze = static_cast<float>(haze);
   lamps.backscatter = static_cast<float>(config.backscatter);
   return lamps;
+}
+
+float share_of_daylight(const LampConfig& config, double since_s) {
+  if (config.count == 0) return 1.0F;
+  const auto ramp = [&](double from_s) {
+    if (!(config.fade_s > 0.0)) return since_s >= from_s ? 1.0 : 0.0;
+    return std::clamp((since_s - from_s) / config.fade_s, 0.0, 1.0);
+  };
+  const double gone = ramp(config.ambient_from_s) - ramp(config.ambient_until_s);
+  return static_cast<float>(std::pow(config.ambient, std::clamp(gone, 0.0, 1.0)));
 }
 
 }  // namespace sovo::sim

@@ -15,10 +15,9 @@ struct Lamp {
   Eigen::Vector3f axis = Eigen::Vector3f::UnitZ();     ///< Of the beam.
 };
 
-/// The vehicle's own lamps, which move with the cameras, and what is left of the world's light.
+/// The vehicle's own lamps, which move with the cameras.
 struct Lamps {
   std::vector<Lamp> lamps;
-  float ambient = 1.0F;      ///< Share of the world's light that is left.
   float power = 0.0F;        ///< Light of each on a surface that faces it, 1 m away.
   float sharpness = 0.0F;    ///< Of the beam: light falls as exp(-sharpness * (1 - cos)).
   float haze = 0.0F;         ///< Share of the light that is lost is 1 - exp(-haze * way).
@@ -41,5 +40,9 @@ struct Lamps {
 
 /// Lamps of a rig as `side` has them. `haze`: of the world.
 Lamps place_lamps(const LampConfig& config, const StereoRig& rig, Side side, double haze);
+
+/// Share of the world's own light that is there at a time after the first pair [s]: as one dives at
+/// an even pace it falls, and returns, by equal factors in equal times.
+float share_of_daylight(const LampConfig& config, double since_s);
 
 }  // namespace sovo::sim

@@ -147,7 +147,7 @@ OwnBody::OwnBody(Body body, const StereoRig& rig, Side side, const RayTable& ray
 void OwnBody::draw(const Daylight& daylight, ImageF* picture) const {
   for (const Pixel& p : pixels_) {
     const float sun = daylight.sun * std::max(0.0F, p.normal.dot(daylight.to_sun));
-    float falls = lamps_.ambient * (daylight.ambient + sun);
+    float falls = daylight.ambient + sun;
     if (lamps_.lit()) falls += lamps_.on_surface(p.range * p.ray, p.normal, false);
     float& pixel = picture->at(p.x, p.y);
     pixel += p.covered * (p.reflected * falls * daylight.factor - pixel);

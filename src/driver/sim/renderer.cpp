@@ -54,6 +54,11 @@ Renderer::Renderer(const Scene& scene, const CameraModel& camera, const Lamps& l
   tile_pierced_.resize(tiles);
 }
 
+void Renderer::set_daylight(float share) {
+  daylight_ = share;
+  shader_.set_daylight(share);
+}
+
 void Renderer::render(const SE3& T_world_camera, double t, RenderedImage* image) {
   const CameraModel& camera = rays_.camera();
   image->light.resize(camera.width, camera.height);
@@ -259,7 +264,7 @@ void Renderer::draw_particles(const View& view, const Band& band, RenderedImage*
     const double edge = std::clamp((0.5 * p.box - distance) / (0.15 * p.box), 0.0, 1.0);
     const double peak = 0.75 * own * own / (wide * wide) * edge;
     if (peak < 0.004) continue;
-    float brightness = lamps_.ambient * p.brightness;
+    float brightness = daylight_ * p.brightness;
     if (lamps_.lit()) brightness += p.brightness * lamps_.at(in_camera.cast<float>());
     const int reach = std::min(24, static_cast<int>(std::ceil(2.5 * wide)));
     for (int y = std::max(band.begin, cy - reach); y < std::min(band.end, cy + reach + 1); ++y) {

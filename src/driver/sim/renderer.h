@@ -30,6 +30,9 @@ class Renderer {
   Renderer(const Scene& scene, const CameraModel& camera, const Lamps& lamps = {},
            const OwnShadow& shadow = {});
 
+  /// Share of the world's own light that is there from now on.
+  void set_daylight(float share);
+
   /// The picture from a pose at time `t` of the world [s].
   void render(const SE3& T_world_camera, double t, RenderedImage* image);
 
@@ -69,6 +72,7 @@ class Renderer {
 
   const Scene* scene_;
   Lamps lamps_;
+  float daylight_ = 1.0F;  ///< Share of the world's own light.
   RayTable rays_;
   SceneView view_;
   Shader shader_;

@@ -139,7 +139,7 @@ void Shader::light(const SurfaceView& view, RayBatch* rays, BatchFloats* light) 
   const bool round = view.shape == Shape::kCylinder;
   if (round) light_cylinder(view, *rays, to_sun_, scene_->ambient, scene_->sun, &spots);
   for (std::size_t i = 0; i < end; ++i) {
-    (*light)[i] *= s.tint * (round ? spots.light[i] : s.light) * lamps_.ambient;
+    (*light)[i] *= s.tint * (round ? spots.light[i] : s.light) * daylight_;
   }
   if (shadow_.falls()) {
     add_own_shadow(*rays, s.light, round ? &spots : nullptr, spots.end, light);
@@ -151,7 +151,7 @@ void Shader::light(const SurfaceView& view, RayBatch* rays, BatchFloats* light) 
   if (scene_->caustics >= 0) add_caustics(spots, light);
   if (lamps_.lit()) lamps_.add_reflected(view, *rays, spots.end, reflectance, light);
   if (scene_->haze > 0.0) {
-    add_haze(static_cast<float>(scene_->haze), lamps_.ambient * scene_->haze_colour, spots.end,
+    add_haze(static_cast<float>(scene_->haze), daylight_ * scene_->haze_colour, spots.end,
              rays->range.data(), light->data());
   }
   if (lamps_.lit()) lamps_.add_backscatter(*rays, spots.end, light);
@@ -219,7 +219,7 @@ float Shader::sky_of(const Eigen::Vector3f& ray, float pixel_angle) const {
 
 void Shader::sky(RayBatch* rays, BatchFloats* light) const {
   for (std::size_t i = 0; i < static_cast<std::size_t>(rays->count); ++i) {
-    (*light)[i] = lamps_.ambient * sky_of({rays->dx[i], rays->dy[i], rays->dz[i]}, rays->angle[i]);
+    (*light)[i] = daylight_ * sky_of({rays->dx[i], rays->dy[i], rays->dz[i]}, rays->angle[i]);
   }
   if (lamps_.lit()) lamps_.add_backscatter(*rays, rays->count, light);
 }

@@ -20,6 +20,9 @@ class Shader {
   /// Moves the camera, and the water, to time `t` [s].
   void update(const SE3& T_world_camera, double t);
 
+  /// Share of the world's own light that is there from now on.
+  void set_daylight(float share) { daylight_ = share; }
+
   /// Light from where rays meet a surface.
   void light(const SurfaceView& view, RayBatch* rays, BatchFloats* light) const;
 
@@ -39,6 +42,7 @@ class Shader {
 
   const Scene* scene_;
   Lamps lamps_;
+  float daylight_ = 1.0F;  ///< Share of the world's own light.
   OwnShadow shadow_;
   SE3 T_world_camera_;
   Mat3 R_world_camera_ = Mat3::Identity();

@@ -154,6 +154,9 @@ struct LampConfig {
   double above_m = 0.2;
   double beam_deg = 70.0;
   double ambient = 0.02;
+  double ambient_from_s = 0.0;
+  double ambient_until_s = 1e9;
+  double fade_s = 0.0;
   double backscatter = 0.1;
 
   template <class Visitor>
@@ -164,6 +167,9 @@ struct LampConfig {
     v("beam_deg", beam_deg,
       "angle across a beam within which it has more than half its light [deg]");
     v("ambient", ambient, "share of the world's own light that is left when there are lamps");
+    v("ambient_from_s", ambient_from_s, "time from which on no more is left [s]");
+    v("ambient_until_s", ambient_until_s, "time at which the world's light returns [s]");
+    v("fade_s", fade_s, "time that it takes to go, and to return: one dives, and rises [s]");
     v("backscatter", backscatter, "share of the light lost in haze that comes back");
   }
 };

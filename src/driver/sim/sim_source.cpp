@@ -101,6 +101,13 @@ Result<void> check_lamps(const LampConfig& lamps) {
   if (!(lamps.ambient >= 0.0 && lamps.ambient <= 1.0)) {
     return Error{"lamps.ambient must be in [0, 1]"};
   }
+  if (!(lamps.ambient_from_s >= 0.0 && lamps.ambient_until_s >= lamps.ambient_from_s)) {
+    return Error{
+        "lamps.ambient_until_s must not be before lamps.ambient_from_s, nor that before 0"};
+  }
+  if (!(lamps.fade_s >= 0.0 && lamps.fade_s <= 1e6)) {
+    return Error{"lamps.fade_s must be in [0, 1e6]"};
+  }
   if (!(lamps.backscatter >= 0.0 && lamps.backscatter <= 1.0)) {
     return Error{"lamps.backscatter must be in [0, 1]"};
   }
@@ -241,13 +248,15 @@ void SimSource::take(Renderer* renderer, Side which, double t, RenderedImage* im
 SideImage SimSource::make_side(Side which, double t, std::uint64_t frame, Renderer* renderer,
                                ExposureControl* exposure, const Sensor& sensor) const {
   const double along = config_.reverse ? -1.0 : 1.0;
+  const double since = time_of(frame);
+  const float share = share_of_daylight(config_.lamps, since);
+  renderer->set_daylight(share);
   RenderedImage image;
   take(renderer, which, t, &image);
-  const double since = time_of(frame);
   change_light(config_.sensor, since, &image.light);
   const OwnBody& body = which == Side::kLeft ? left_body_ : right_body_;
   const Vec3 to_sun = camera_at(which, t).rotation().inverse() * scene_.to_sun;
-  const OwnBody::Daylight daylight{to_sun.cast<float>(), scene_.ambient, scene_.sun,
+  const OwnBody::Daylight daylight{to_sun.cast<float>(), share * scene_.ambient, share * scene_.sun,
                                    light_factor(config_.sensor, since)};
   if (!settled_) {
     ImageF whole = image.light;

@@ -1,5 +1,6 @@
 #include "sovo/vo/lens_equations.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -17,6 +18,16 @@ Mat2 image_gram(const LinearizedResidual& r) {
   Mat2 g;
   g << r.gram[0], r.gram[1], r.gram[1], r.gram[4];
   return g;
+}
+
+/// Of the angle between the optical axes of two keyframes [rad].
+double squared_turn(const Window& window, int host, int target) {
+  const CameraModel& camera = window.camera();
+  const Eigen::Vector3f axis =
+      window.pair(host, target).RKi * Vec3(camera.cx, camera.cy, 1.0).cast<float>();
+  const double angle =
+      std::atan2(static_cast<double>(axis.head<2>().norm()), static_cast<double>(axis.z()));
+  return angle * angle;
 }
 
 /// Part of the balanced Hessian that is added to its diagonal: what single precision leaves of the
@@ -86,6 +97,7 @@ void LensEquations::add(int host, const Point& point, double depth_damping,
     Pair& pair = pairs_[pair_of(host, inliers[i].target)];
     pair.cross += cross - depth * H_rho_c.transpose() / H_rho;
     pair.gradient += gradient - depth * (b_rho / H_rho);
+    ++pair.residuals;
   }
 }
 
@@ -93,10 +105,14 @@ std::optional<LensEvidence> LensEquations::evidence(const NormalEquations& syste
   const int n = window_.size();
   // J_x^T [J_c, r] of the states.
   MatX right = MatX::Zero(Eigen::Index{8} * n, 3);
+  double squared_turns = 0.0;
+  int residuals = 0;
   for (int h = 0; h < n; ++h) {
     for (int t = 0; t < n; ++t) {
       if (h == t) continue;
       const Pair& pair = pairs_[pair_of(h, t)];
+      squared_turns += pair.residuals * squared_turn(window_, h, t);
+      residuals += pair.residuals;
       Eigen::Matrix<double, 8, 3> relative;
       relative << pair.cross, pair.gradient;
       right.middleRows<8>(Eigen::Index{8} * t) += relative;
@@ -112,6 +128,7 @@ std::optional<LensEvidence> LensEquations::evidence(const NormalEquations& syste
   right = balance.asDiagonal() * right;
   const MatX solved = solve_symmetric_columns(H, right);
   LensEvidence out;
+  out.turn = std::sqrt(squared_turns / std::max(1, residuals));
   out.H = H_ - right.leftCols<2>().transpose() * solved.leftCols<2>();
   out.b = b_ - right.leftCols<2>().transpose() * solved.col(2);
   const bool tells = out.H.allFinite() && out.b.allFinite() && out.H(0, 0) > 0.0 &&

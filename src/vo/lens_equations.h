@@ -41,6 +41,7 @@ class LensEquations {
   struct Pair {
     Mat82 cross = Mat82::Zero();
     Vec8 gradient = Vec8::Zero();
+    int residuals = 0;
   };
   const Window& window_;
   std::vector<Pair> pairs_;

@@ -16,6 +16,8 @@ namespace sovo {
 struct LensEvidence {
   Mat2 H = Mat2::Zero();
   Vec2 b = Vec2::Zero();
+  /// Angle between the optical axes of the keyframes of a residual: root of the mean square [rad].
+  double turn = 0.0;
 
   void weigh(double factor) {
     H *= factor;
@@ -30,7 +32,8 @@ struct LensFit {
 
 /// Least squares over `keyframes`, in the order in which they were made. What neighbouring
 /// keyframes show is much the same, and errs alike: the standard deviations come from leaving out
-/// one tenth of them after the other (jackknife). Nothing of fewer than ten.
+/// one tenth of them after the other (jackknife). Keyframes between which the cameras hardly turn
+/// do not count; nothing of fewer than ten that do.
 std::optional<LensFit> fit_lens(std::span<const LensEvidence> keyframes);
 
 /// Tells while the vehicle moves whether the focal length is not the one that was calibrated.
@@ -44,7 +47,7 @@ class LensWatch {
   double focal_error() const;
 
  private:
-  std::deque<LensEvidence> keyframes_;  ///< The newest.
+  std::deque<LensEvidence> keyframes_;  ///< The newest that turned enough.
   mutable std::mutex mutex_;            ///< Of the result.
   double focal_error_ = 0.0;
 };

@@ -10,10 +10,10 @@ namespace sovo {
 
 namespace {
 
-constexpr double kForgetLight = 0.9;    ///< A keyframe.
+constexpr double kForgetLight = 0.8;    ///< A keyframe.
 constexpr double kForgetJudged = 0.85;  ///< A keyframe.
 constexpr int kLearnFirst = 2;          ///< Keyframes.
-constexpr double kLightPrior = 0.1;     ///< On each term, of which most are about one.
+constexpr double kLightPrior = 1e-4;    ///< On each term, of which most are about one.
 constexpr std::size_t kFewestInPair = 20;
 constexpr std::size_t kFewestInAll = 100;
 constexpr double kDarkestGrey = 8.0;      ///< Grey levels between which logarithms
@@ -33,6 +33,12 @@ LightSight light_sight(const CameraModel& camera, const PointSight& s) {
       b.x() * b.x() - a.x() * a.x(), b.x() * b.y() - a.x() * a.y(), b.y() * b.y() - a.y() * a.y();
   sight.log_ratio = std::log(s.grey / s.grey_host);
   return sight;
+}
+
+/// Lamps light what is near, or what is in the middle of the image.
+bool is_of_lamps(const Vec6& light) {
+  constexpr double kLeastExponent = 0.5;  // of the distance
+  return light[0] > kLeastExponent || light[3] + light[5] < 0.0;
 }
 
 bool has_enough(const std::vector<LightSight>& pair) { return pair.size() >= kFewestInPair; }
@@ -97,12 +103,17 @@ void MovingLight::judge(const Pairs& pairs) {
   log_left_ = kForgetJudged * log_left_ + std::log(after / before);
   log_scatter_ = kForgetJudged * log_scatter_ + std::log(before);
   if (learned_ + 1 < kLearnFirst + config_.keyframes) return;
+  const double scattered = std::exp(log_scatter_ / judged_);
+  const double most =
+      scattered > config_.strong_scatter ? config_.most_left_strong : config_.most_left;
+  const bool lit = std::exp(log_left_ / judged_) < most && scattered > config_.least_scatter &&
+                   is_of_lamps(light_);
   const std::lock_guard lock(mutex_);
-  found_ = found_ || (std::exp(log_left_ / judged_) < config_.most_left &&
-                      std::exp(log_scatter_ / judged_) > config_.least_scatter);
+  found_ = found_ || lit;
 }
 
-/// The brightness of each pair is eliminated.
+/// The brightness of each pair is eliminated. Keyframes weigh alike: those by daylight, which have
+/// a tenth of the scatter, would outvote dozens of those in the dark into which one dives.
 void MovingLight::learn(const Pairs& pairs) {
   find_left(light_, pairs);
   const double sigma = scatter();
@@ -115,8 +126,7 @@ void MovingLight::learn(const Pairs& pairs) {
     Vec6 mean = Vec6::Zero(), product = Vec6::Zero();
     Mat6 square = Mat6::Zero();
     for (const LightSight& s : pair) {
-      const double e = std::max(left_[i++], kLightHuber * sigma);
-      const double w = kLightHuber / (sigma * e);
+      const double w = kLightHuber * sigma / std::max(left_[i++], kLightHuber * sigma);
       sum += w;
       ratio += w * s.log_ratio;
       mean += w * s.terms;

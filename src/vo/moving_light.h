@@ -10,15 +10,20 @@
 namespace sovo {
 
 struct MovingLightConfig {
-  int keyframes = 4;            ///< That must have told, before lamps are believed.
-  double most_left = 0.75;      ///< Of the scatter of brightness, once lamps explain it.
-  double least_scatter = 0.02;  ///< Of the logarithm of brightness: less is worth no lamps.
+  int keyframes = 4;               ///< That must have told, before lamps are believed.
+  double most_left = 0.75;         ///< Of the scatter of brightness, once lamps explain it.
+  double least_scatter = 0.02;     ///< Of the logarithm of brightness: less is worth no lamps.
+  double strong_scatter = 0.08;    ///< Daylight hardly makes that much:
+  double most_left_strong = 0.82;  ///< then lamps need not explain as much of it.
 
   template <class Visitor>
   void visit(Visitor& v) {
     v("keyframes", keyframes, "that must have told, before lamps are believed");
     v("most_left", most_left, "share of the scatter of brightness that lamps leave unexplained");
     v("least_scatter", least_scatter, "of the logarithm of brightness, that is worth looking into");
+    v("strong_scatter", strong_scatter,
+      "of the logarithm of brightness, that daylight hardly makes");
+    v("most_left_strong", most_left_strong, "most_left where there is more than that");
   }
 };
 
@@ -35,7 +40,8 @@ struct LightSight {
 /// The light is modelled as exp(a log(1/z) + a quadratic of the place in the image), and fitted to
 /// how the logarithm of points' brightness changes between keyframes. What was fitted to the
 /// keyframes before is tried on what the newest one shows: by daylight it explains hardly anything
-/// there, by lamps a quarter of the scatter and more.
+/// there, by lamps a quarter of the scatter and more; less is enough where brightness scatters more
+/// than daylight makes it. Lamps light what is near, or in the middle.
 class MovingLight {
  public:
   explicit MovingLight(const MovingLightConfig& config) : config_(config) {}

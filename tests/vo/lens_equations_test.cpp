@@ -78,15 +78,19 @@ Window turned_window(const CameraModel& taken) {
   return window;
 }
 
-/// What a window sees of its lens once bundle adjustment has bent the world to it.
-LensChange seen_by_window(const LensChange& wrong) {
-  Window window = turned_window(with_changed_numbers(small_camera(), {wrong.focal, 0.0}));
+/// What a window shows of its lens once bundle adjustment has bent the world to it.
+LensEvidence shown_by(Window* window) {
   WorkerPool pool(1);
   WindowConfig config;
   config.lens_every = 1;
-  const BundleResult result = BundleAdjuster(config, &pool).optimize(&window);
+  const BundleResult result = BundleAdjuster(config, &pool).optimize(window);
   EXPECT_TRUE(result.lens.has_value());
-  const LensEvidence lens = result.lens.value_or(LensEvidence());
+  return result.lens.value_or(LensEvidence());
+}
+
+LensChange seen_by_window(const LensChange& wrong) {
+  Window window = turned_window(with_changed_numbers(small_camera(), {wrong.focal, 0.0}));
+  const LensEvidence lens = shown_by(&window);
   return LensChange::of(-lens.H.inverse() * lens.b);
 }
 
@@ -100,6 +104,24 @@ TEST(LensEquations, SeeAWrongFocalLength) {
     EXPECT_LT(seen / wrong, -0.7) << wrong;
     EXPECT_GT(seen / wrong, -1.3) << wrong;
   }
+}
+
+TEST(LensEquations, TellHowFarTheViewTurns) {
+  Window window = turned_window(small_camera());
+  double squares = 0.0;
+  int pairs = 0;
+  for (int h = 0; h + 1 < window.size(); ++h) {
+    for (int t = 0; t < window.size(); ++t) {
+      if (t == h) continue;
+      const Vec3 a = window[h].T_world_camera().rotation_matrix().col(2);
+      const Vec3 b = window[t].T_world_camera().rotation_matrix().col(2);
+      squares += std::pow(std::acos(a.dot(b)), 2);
+      ++pairs;
+    }
+  }
+  const double expected = std::sqrt(squares / pairs);
+  EXPECT_GT(expected, 0.1);
+  EXPECT_NEAR(shown_by(&window).turn, expected, 0.1 * expected);
 }
 
 TEST(LensEquations, AreAskedOfOneInSoManyKeyframes) {

@@ -16,6 +16,7 @@ LensEvidence keyframe_that_sees(const Vec2& value, double information = 1e6) {
   LensEvidence out;
   out.H << information, 0.4 * information, 0.4 * information, information;
   out.b = -out.H * value;
+  out.turn = 0.3;
   return out;
 }
 
@@ -63,6 +64,24 @@ TEST(LensFit, NeedsTenKeyframes) {
   EXPECT_TRUE(fit_lens(keyframes_that_see(0.01, 0.001, 10)).has_value());
 }
 
+/// Keyframes that see a focal length, between which the cameras turn by so much.
+std::vector<LensEvidence> keyframes_that_turn(double turn, double focal, int n) {
+  auto out = keyframes_that_see(focal, 0.001, n);
+  for (LensEvidence& keyframe : out) keyframe.turn = turn;
+  return out;
+}
+
+/// Seven degrees do not tell a focal length, nine do.
+TEST(LensFit, CountsKeyframesThatTurn) {
+  auto keyframes = keyframes_that_turn(0.16, 0.004, 12);
+  const auto straight = keyframes_that_turn(0.12, -0.03, 60);
+  EXPECT_FALSE(fit_lens(straight).has_value());
+  keyframes.insert(keyframes.begin() + 4, straight.begin(), straight.end());
+  const auto fit = fit_lens(keyframes);
+  ASSERT_TRUE(fit.has_value());
+  EXPECT_NEAR(fit->change.focal, 0.004, 0.001);
+}
+
 TEST(LensFit, IsNoneWhereNothingTells) {
   EXPECT_FALSE(fit_lens(std::vector<LensEvidence>(20)).has_value());
 }
@@ -96,6 +115,11 @@ TEST(LensWatch, IsSilentWhereATenthOfTheKeyframesMakesItAll) {
   auto keyframes = keyframes_that_see(0.0, 0.001, 54);
   for (int i = 0; i < 6; ++i) keyframes.push_back(keyframe_that_sees({-0.08, 0.0}));
   EXPECT_EQ(watched(keyframes), 0.0);
+}
+
+TEST(LensWatch, IsSilentOnStraightRoads) {
+  EXPECT_EQ(watched(keyframes_that_turn(0.12, -0.03, 200)), 0.0);
+  EXPECT_NE(watched(keyframes_that_turn(0.16, -0.03, 200)), 0.0);
 }
 
 TEST(LensWatch, RemembersWhatWasClear) {

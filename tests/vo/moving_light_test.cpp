@@ -116,6 +116,30 @@ TEST(MovingLight, WhatHardlyMattersIsLeftAlone) {
   expect_found_only_with(mild, sights);
 }
 
+/// Lamps over rough ground, whose sides are lit and not: much else changes, too.
+TEST(MovingLight, LessIsEnoughWhereBrightnessScattersMore) {
+  LitSights sights;
+  sights.light = 0.5 * kBeam;
+  sights.noise = 0.1;
+  EXPECT_GT(found_after(sights, 30), 0);
+  sights.light = 0.18 * kBeam;
+  sights.noise = 0.04;
+  MovingLightConfig mild;
+  mild.most_left = mild.most_left_strong;
+  expect_found_only_with(mild, sights);
+}
+
+TEST(MovingLight, WhatIsBrightAtTheEdgesAndNotNearbyIsNoLamp) {
+  LitSights sights;
+  sights.light = 2.0 * kBeam;
+  sights.light[0] = 0.0;
+  EXPECT_GT(found_after(sights, 60), 0);
+  sights.light.tail<3>() *= -1.0;
+  EXPECT_EQ(found_after(sights, 60), 0);
+  sights.light[0] = 2.0;
+  EXPECT_GT(found_after(sights, 60), 0);
+}
+
 TEST(MovingLight, FewSightsTellNothing) {
   LitSights sights;
   sights.light = kBeam;
@@ -137,6 +161,19 @@ TEST(MovingLight, ComesOnLater) {
   for (; keyframes < 40 && !light.found(); ++keyframes) light.observe(sights.take());
   EXPECT_TRUE(light.found());
   EXPECT_LT(keyframes, 35) << "what was learned by daylight fades";
+}
+
+/// By daylight brightness hardly changes, which says nothing about the dark.
+TEST(MovingLight, SoItDoesAfterAClearDay) {
+  MovingLight light{MovingLightConfig()};
+  LitSights sights;
+  sights.noise = 0.005;
+  for (int i = 0; i < 60; ++i) light.observe(sights.take());
+  sights.light = kBeam;
+  sights.noise = 0.05;
+  int keyframes = 0;
+  for (; keyframes < 40 && !light.found(); ++keyframes) light.observe(sights.take());
+  EXPECT_LT(keyframes, 15);
 }
 
 }  // namespace

@@ -219,6 +219,13 @@ class Robustness(SimTest):
         self.assertEqual(len(live), len(truth))
         self.assertLess(largest_error(live, truth, live[0][0]), 0.03)
 
+    def test_lamps_are_found_out_where_one_dives_into_the_dark(self):
+        dive = ("--set", "sim.lamps.count=2", "--set", "sim.lamps.ambient_from_s=3", "--set",
+                "sim.lamps.fade_s=2")
+        truth, live = self.fly("pool", "--frames", 120, *dive, calibration=())
+        self.assertIn("lamps that move along light the scene; a new segment begins", self.log)
+        self.expect_whole(truth, live, 0.03)
+
     def test_lamps_of_the_vehicle_light_the_dark(self):
         # With lighting: world 0.09 m off, and lost.
         for light in (("--reverse",), ("--set", "sim.lamps.beam_deg=45")):

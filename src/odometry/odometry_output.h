@@ -137,7 +137,7 @@ struct KeyframeOutput {
   int halvings = 0;  ///< How often both were halved, unlike `u` and `v`.
   /// Of the size of `left`: 0 where what is seen moves along with the camera; null: nothing does.
   std::shared_ptr<const ImageU8> co_moving_mask;
-  std::optional<LensEvidence> lens;  ///< Of one of `vo.window.lens_every`.
+  std::optional<LensEvidence> lens;  ///< Of one of `vo.window.lens_every`, where it turned.
 };
 
 /// One run of the scale optimizer, a line of `--keyframes`.

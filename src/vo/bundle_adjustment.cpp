@@ -34,6 +34,18 @@ MatX orthonormalized(MatX n) {
          values.tail(rank).cwiseSqrt().cwiseInverse().asDiagonal();
 }
 
+/// Largest angle between the optical axes of two keyframes [rad].
+double widest_turn(const Window& window) {
+  double cosine = 1.0;
+  for (int i = 0; i < window.size(); ++i) {
+    const Vec3 axis = window[i].T_camera_world.rotation_matrix().row(2);
+    for (int j = 0; j < i; ++j) {
+      cosine = std::min(cosine, window[j].T_camera_world.rotation_matrix().row(2).dot(axis));
+    }
+  }
+  return std::acos(std::clamp(cosine, -1.0, 1.0));
+}
+
 }  // namespace
 
 void BundleAdjuster::Backup::take(const Window& window, const std::vector<PointRef>& points) {
@@ -303,7 +315,7 @@ double BundleAdjuster::scale_information(const WindowLinearization& at,
 
 bool BundleAdjuster::tells_lens(const Window& window) const {
   return config_.lens_every > 0 && window.size() > 2 &&
-         window.newest().id % config_.lens_every == 0;
+         window.newest().id % config_.lens_every == 0 && widest_turn(window) >= kLeastLensTurn;
 }
 
 std::optional<LensEvidence> BundleAdjuster::lens_evidence(const Window& window) {

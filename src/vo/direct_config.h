@@ -151,7 +151,7 @@ struct WindowConfig {
   double prior_b = 1.0;                    ///< The same for the bias.
   double min_relative_information = 50.0;  ///< H_rho * mean_rho^2 of a point to be marginalized.
   int min_good_residuals = 3;
-  int lens_every = 4;  ///< Keyframes of which one tells what it shows of the lens; 0: none does.
+  int lens_every = 2;  ///< Keyframes of which one tells of the lens where cameras turn; 0: none.
 
   template <class Visitor>
   void visit(Visitor& v) {
@@ -181,7 +181,8 @@ struct WindowConfig {
       "information on a point's log-depth needed to marginalize rather than drop it");
     v("min_good_residuals", min_good_residuals, "residuals needed to marginalize a point");
     v("lens_every", lens_every,
-      "one of so many keyframes tells whether the lens is as it was calibrated; 0: none does");
+      "where the cameras turn, one of so many keyframes tells whether the lens is as calibrated; "
+      "0: none does");
   }
 };
 

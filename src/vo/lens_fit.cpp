@@ -15,11 +15,7 @@ namespace {
 constexpr double kFocalError = 1e-3;
 constexpr double kRadialError = 1e-3;
 
-/// Turns tell a focal length. Where cameras turn less than this between keyframes [rad], what
-/// patterns err by as they come nearer outweighs it: by up to 3 %, in keyframe after keyframe.
-constexpr double kLeastTurn = 0.14;
-
-bool turns_enough(const LensEvidence& keyframe) { return keyframe.turn >= kLeastTurn; }
+bool turns_enough(const LensEvidence& keyframe) { return keyframe.turn >= kLeastLensTurn; }
 
 /// A keyframe is as sure as it can be.
 LensEvidence tempered(const LensEvidence& keyframe) {
@@ -86,8 +82,8 @@ std::optional<LensFit> fit_lens(std::span<const LensEvidence> keyframes) {
 void LensWatch::note(const LensEvidence& keyframe) {
   constexpr std::size_t kFewest = 12;
   constexpr std::size_t kMost = 60;
-  // Keyframes err alike, those of good lenses by up to 0.3 % together; of 2 % they see 1.2 to 1.6.
-  constexpr double kClear = 8e-3;
+  // Keyframes err alike, those of good lenses by up to 0.3 % together; of 2 % they see 1.1 to 1.7.
+  constexpr double kClear = 1e-2;
   constexpr double kSigmas = 4.0;
   if (!turns_enough(keyframe)) return;
   keyframes_.push_back(keyframe);

@@ -128,7 +128,7 @@ TEST(LensEquations, AreAskedOfOneInSoManyKeyframes) {
   WorkerPool pool(1);
   WindowConfig config;
   const auto told = [&](int every) {
-    Window window = scene_window(4);  // its newest keyframe is number 3
+    Window window = turned_window(small_camera());  // its newest keyframe is number 6
     config.lens_every = every;
     return BundleAdjuster(config, &pool).optimize(&window).lens.has_value();
   };
@@ -136,6 +136,9 @@ TEST(LensEquations, AreAskedOfOneInSoManyKeyframes) {
   EXPECT_TRUE(told(3));
   EXPECT_FALSE(told(4));
   EXPECT_FALSE(told(0));
+  config.lens_every = 1;
+  Window straight = scene_window(4);
+  EXPECT_FALSE(BundleAdjuster(config, &pool).optimize(&straight).lens.has_value());
 }
 
 }  // namespace

@@ -94,26 +94,26 @@ double watched(const std::vector<LensEvidence>& keyframes) {
 }
 
 TEST(LensWatch, TellsAFocalLengthThatAllSee) {
-  EXPECT_NEAR(watched(keyframes_that_see(-0.01, 0.002, 30)), -0.01, 0.002);
-  EXPECT_NEAR(watched(keyframes_that_see(0.01, 0.002, 30)), 0.01, 0.002);
+  EXPECT_NEAR(watched(keyframes_that_see(-0.015, 0.002, 30)), -0.015, 0.002);
+  EXPECT_NEAR(watched(keyframes_that_see(0.015, 0.002, 30)), 0.015, 0.002);
 }
 
 TEST(LensWatch, WaitsForADozenKeyframes) {
-  EXPECT_EQ(watched(keyframes_that_see(-0.01, 0.0, 11)), 0.0);
-  EXPECT_NE(watched(keyframes_that_see(-0.01, 0.0, 12)), 0.0);
+  EXPECT_EQ(watched(keyframes_that_see(-0.02, 0.0, 11)), 0.0);
+  EXPECT_NE(watched(keyframes_that_see(-0.02, 0.0, 12)), 0.0);
 }
 
 TEST(LensWatch, IsSilentAboutLittle) {
-  EXPECT_EQ(watched(keyframes_that_see(-0.003, 0.0, 60)), 0.0);
+  EXPECT_EQ(watched(keyframes_that_see(-0.009, 0.0, 60)), 0.0);
 }
 
 TEST(LensWatch, IsSilentWhereKeyframesScatter) {
-  EXPECT_EQ(watched(keyframes_that_see(-0.006, 0.03, 60)), 0.0);
+  EXPECT_EQ(watched(keyframes_that_see(-0.02, 0.1, 60)), 0.0);
 }
 
 TEST(LensWatch, IsSilentWhereATenthOfTheKeyframesMakesItAll) {
   auto keyframes = keyframes_that_see(0.0, 0.001, 54);
-  for (int i = 0; i < 6; ++i) keyframes.push_back(keyframe_that_sees({-0.08, 0.0}));
+  for (int i = 0; i < 6; ++i) keyframes.push_back(keyframe_that_sees({-0.15, 0.0}));
   EXPECT_EQ(watched(keyframes), 0.0);
 }
 
@@ -123,10 +123,10 @@ TEST(LensWatch, IsSilentOnStraightRoads) {
 }
 
 TEST(LensWatch, RemembersWhatWasClear) {
-  auto keyframes = keyframes_that_see(-0.01, 0.001, 30);
+  auto keyframes = keyframes_that_see(-0.02, 0.001, 30);
   const auto unclear = keyframes_that_see(0.0, 0.001, 200);
   keyframes.insert(keyframes.end(), unclear.begin(), unclear.end());
-  EXPECT_LT(watched(keyframes), -0.003);
+  EXPECT_LT(watched(keyframes), -0.01);
 }
 
 }  // namespace

@@ -314,6 +314,7 @@ double BundleAdjuster::scale_information(const WindowLinearization& at,
 }
 
 bool BundleAdjuster::tells_lens(const Window& window) const {
+  // What is told where no two keyframes turn so far would not count, and takes time.
   return config_.lens_every > 0 && window.size() > 2 &&
          window.newest().id % config_.lens_every == 0 && widest_turn(window) >= kLeastLensTurn;
 }

@@ -25,8 +25,8 @@ struct LensEvidence {
   }
 };
 
-/// Turns tell a focal length. Where cameras turn less than this between keyframes [rad], what
-/// patterns err by as they come nearer outweighs it: by up to 3 %, in keyframe after keyframe.
+/// Turns tell a focal length. Where cameras turn less than this between keyframes [rad], those of a
+/// right lens see one that is up to 2 % shorter, one after the other.
 inline constexpr double kLeastLensTurn = 0.14;
 
 /// A lens as keyframes agree about it, and how sure that is.

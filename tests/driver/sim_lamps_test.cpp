@@ -141,7 +141,6 @@ TEST(LampsTest, ADiveLeadsFromDaylightIntoTheDark) {
   config.frames = 3;
   config.frame_rate = 20.0;
   config.threads = 1;
-  config.own_body = Body::kArms;
   config.lamps.count = 2;
   config.lamps.ambient = 0.05;
   const auto frames_of = [&](double from_s, double until_s) {

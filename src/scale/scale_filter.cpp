@@ -39,6 +39,7 @@ void ScaleFilter::reset() {
 
 void ScaleFilter::lock_initial(double sigma, std::int64_t stamp_ns) {
   locked_ = true;
+  confirmed_ = false;
   searching_ = false;
   agree_again();
   candidate_.reset();
@@ -112,12 +113,13 @@ ScaleUpdate ScaleFilter::update_tracking(const ScaleMeasurement& m) {
   const double innovation_variance = variance_ + measured_variance(m);
   update.nis = square(update.innovation) / innovation_variance;
   learn(update.innovation, innovation_variance);
-  if (!within_gate(update)) {
-    update.verdict = ScaleVerdict::kInnovation;
-    disagree_with(update, measured_variance(m));
-    return update;
-  }
-  return correct(m, update);
+  if (within_gate(update)) return correct(m, update);
+  const double variance = measured_variance(m);
+  // One view gave the lock; by the time that three are against it, newer points have hidden it.
+  if (!confirmed_ && agrees_with_rejected(update, variance)) return lock_on(m, update, variance);
+  update.verdict = ScaleVerdict::kInnovation;
+  disagree_with(update, variance);
+  return update;
 }
 
 ScaleUpdate ScaleFilter::update_cold(const ScaleMeasurement& m) {
@@ -152,6 +154,7 @@ ScaleUpdate ScaleFilter::correct(const ScaleMeasurement& m, ScaleUpdate update) 
   update.gain = K;
   update.log_scale_correction = K * update.innovation;
   update.verdict = ScaleVerdict::kAccepted;
+  confirmed_ = true;
   variance_ = square(1.0 - K) * variance_ + square(K) * R * correlation_growth(c * (1.0 - K));
   // Spectrum of the error at frequency zero: noise passes entire, the walk as it lags.
   path_variance_ = R * correlation_growth(c) + square((1.0 - K) / K) * walked(m);
@@ -164,6 +167,7 @@ ScaleUpdate ScaleFilter::correct(const ScaleMeasurement& m, ScaleUpdate update) 
 /// Takes the measurement whole.
 ScaleUpdate ScaleFilter::lock_on(const ScaleMeasurement& m, ScaleUpdate update, double variance) {
   lock_initial(0.0, m.stamp_ns);
+  confirmed_ = true;
   variance_ = variance;
   path_variance_ = variance;
   update.apply = true;
@@ -185,12 +189,14 @@ void ScaleFilter::disagree() {
   if (disagreements_ >= config_.cold_start_after) searching_ = true;
 }
 
+bool ScaleFilter::agrees_with_rejected(const ScaleUpdate& update, double variance) const {
+  return rejected_ && square(update.innovation - rejected_->log_scale) <=
+                          square(config_.gate_sigmas) * (rejected_->variance + variance);
+}
+
 /// Noise disagrees in all directions; a scale that is wrong, always in one.
 void ScaleFilter::disagree_with(const ScaleUpdate& update, double variance) {
-  const bool agrees =
-      rejected_ && square(update.innovation - rejected_->log_scale) <=
-                       square(config_.gate_sigmas) * (rejected_->variance + variance);
-  const int agreeing = agrees ? agreeing_ + 1 : 1;
+  const int agreeing = agrees_with_rejected(update, variance) ? agreeing_ + 1 : 1;
   disagree();
   doubt_ = 0.5 * square(std::min(std::abs(update.innovation), kLargestDrift));
   agreeing_ = agreeing;

@@ -83,6 +83,8 @@ class ScaleFilter {
   explicit ScaleFilter(const ScaleFilterConfig& config);
 
   /// Stereo depth has given the window its scale: starts locked, with this standard deviation.
+  /// Until a measurement has agreed, two in a row that agree with each other outvote it: the second
+  /// is taken whole.
   void lock_initial(double sigma, std::int64_t stamp_ns);
 
   /// The scale may be off by `log_scale` more than was thought: the standard deviation of what has
@@ -127,6 +129,7 @@ class ScaleFilter {
   ScaleUpdate correct(const ScaleMeasurement& m, ScaleUpdate update);
   ScaleUpdate lock_on(const ScaleMeasurement& m, ScaleUpdate update, double variance);
   void disagree();
+  bool agrees_with_rejected(const ScaleUpdate& update, double variance) const;
   void disagree_with(const ScaleUpdate& update, double variance);
   void agree_again();
   void miss(const ScaleEstimate& estimate);
@@ -137,6 +140,7 @@ class ScaleFilter {
 
   ScaleFilterConfig config_;
   bool locked_ = false;
+  bool confirmed_ = false;  ///< A measurement has agreed with the lock, or given it.
   bool searching_ = false;  ///< Locked, but doubted: cold starts are asked for.
   double variance_ = 0.0;   ///< P
   double path_variance_ = 0.0;

@@ -235,6 +235,26 @@ TEST(ScaleFilter, ThreeDisagreementsThatAgreeWithEachOtherAskForAColdStart) {
   EXPECT_FALSE(filter.wants_cold_start());
 }
 
+TEST(ScaleFilter, TwoThatAgreeOutvoteAStartThatNoneHasConfirmed) {
+  ScaleFilter filter = locked_filter();
+  EXPECT_FALSE(filter.update(measure(0.1, 0.001)).apply);
+  EXPECT_FALSE(filter.update(measure(-0.1, 0.001)).apply) << "they disagree";
+  const ScaleUpdate update = filter.update(measure(-0.101, 0.001));
+  EXPECT_TRUE(update.apply);
+  EXPECT_DOUBLE_EQ(update.log_scale_correction, -0.101);
+  EXPECT_EQ(filter.disagreements(), 0);
+  // What they gave is not outvoted so.
+  EXPECT_FALSE(filter.update(measure(0.1, 0.001)).apply);
+  EXPECT_FALSE(filter.update(measure(0.1, 0.001)).apply);
+}
+
+TEST(ScaleFilter, AConfirmedStartIsNotOutvotedByTwo) {
+  ScaleFilter filter = locked_filter();
+  EXPECT_TRUE(filter.update(measure(0.001, 0.001)).apply);
+  EXPECT_FALSE(filter.update(measure(-0.1, 0.001)).apply);
+  EXPECT_FALSE(filter.update(measure(-0.1, 0.001)).apply);
+}
+
 TEST(ScaleFilter, AgreementBeginsAnewAfterAnAcceptedMeasurement) {
   ScaleFilter filter = locked_filter();
   for (int i = 0; i < 20; ++i) filter.update(measure(0.0, 0.001));

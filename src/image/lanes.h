@@ -209,6 +209,12 @@ template <class F>
 SOVO_LANE_FUNCTION F min_lane(const F& a, const F& b) {
   return a < b ? a : b;
 }
+/// v, `least` or `most`; `most` where v is not a number.
+template <class F>
+SOVO_LANE_FUNCTION F clamp_lane(const F& v, const F& least, const F& most) {
+  const F below = min_lane(v, most);
+  return below < least ? least : below;
+}
 template <class F>
 SOVO_LANE_FUNCTION F abs_lane(const F& v) {
   using M = MaskOf<F>;

@@ -146,6 +146,8 @@ struct WindowConfig {
   double min_parallax = 2.0;               ///< Below it stereo depths stand against steps [px].
   double stop_threshold = 1.2;             ///< Times the step norms below which iteration stops.
   double resample_px = 0.01;               ///< Motion of a pattern above which it is sampled anew.
+  bool equal_blur = true;                  ///< Colours are blurred as the target blurs them.
+  double point_spread_px = 0.5;            ///< Standard deviation of a camera's point spread [px].
   double static_weight = 4.0;              ///< Of residuals in a keyframe's own right image.
   double prior_a = 1e4;                    ///< Weight of the prior on each frame's log-gain.
   double prior_b = 1.0;                    ///< The same for the bias.
@@ -173,6 +175,10 @@ struct WindowConfig {
     v("stop_threshold", stop_threshold, "iteration stops below this x the step thresholds");
     v("resample_px", resample_px,
       "patterns that moved by less since they were sampled are not sampled again [px]; 0: always");
+    v("equal_blur", equal_blur,
+      "compare patterns as the target's image blurs them where it shows them smaller, and between "
+      "its pixels");
+    v("point_spread_px", point_spread_px, "standard deviation of a camera's point spread [px]");
     v("static_weight", static_weight,
       "mode stereo: weight of residuals in a keyframe's own right image");
     v("prior_a", prior_a, "weight of the prior on each frame's log-gain");

@@ -62,12 +62,7 @@ void set_interval(const DepthProposal& depth, double sigmas, ImmaturePoint* p) {
 }
 
 Point start_point(const ImmaturePoint& immature, const DepthProposal& depth) {
-  Point p;
-  p.u = immature.u;
-  p.v = immature.v;
-  p.type = immature.type;
-  p.colour = immature.colour;
-  p.weight = immature.weight;
+  Point p = point_of(immature);
   p.rho = std::max(depth.rho, 1e-5F);
   p.hessian = information_of_sigma(depth.sigma);
   p.static_information = static_cast<float>(p.hessian);

@@ -221,6 +221,15 @@ LineResiduals line_residuals(const ImageF& image, const SearchPattern& pattern, 
   return out;
 }
 
+namespace {
+
+/// Along a step of a pixel (du, dv) [grey levels].
+float second_difference(const ImageF& image, float u, float v, float du, float dv) {
+  return sample(image, u - du, v - dv) - 2.0F * sample(image, u, v) + sample(image, u + du, v + dv);
+}
+
+}  // namespace
+
 bool make_immature_point(const ImageF& image, float u, float v, std::uint8_t type,
                          const PointConfig& config, double gradient_constant, ImmaturePoint* out) {
   if (!in_image(image, u, v, kPatternBorder)) return false;
@@ -234,6 +243,8 @@ bool make_immature_point(const ImageF& image, float u, float v, std::uint8_t typ
     if (!std::isfinite(s.value)) return false;
     p.colour[i] = s.value;
     p.weight[i] = std::sqrt(c2 / (c2 + s.gx * s.gx + s.gy * s.gy));
+    p.bend_u[i] = second_difference(image, u + kPattern[i].x, v + kPattern[i].y, 1.0F, 0.0F);
+    p.bend_v[i] = second_difference(image, u + kPattern[i].x, v + kPattern[i].y, 0.0F, 1.0F);
     p.gxx += s.gx * s.gx;
     p.gxy += s.gx * s.gy;
     p.gyy += s.gy * s.gy;

@@ -30,6 +30,9 @@ T gram_row(const std::array<float, 10>& gram, std::size_t row, const std::array<
 /// Sum of squared gradients below which a pattern says nothing.
 constexpr float kMinGradientEnergy = 2.0F;
 
+/// What colours are blurred by at most: second differences tell of narrow kernels only [px^2].
+constexpr float kMostSpread = 0.5F;
+
 constexpr float kMinDepth = 1e-6F;  ///< Least z_target / z_host of a point in front.
 
 /// Geometric Jacobian at the centre pixel, poses frozen (DSO eq. 13 ff.).
@@ -92,6 +95,15 @@ PatternWarp pattern_warp(const PairGeometry& g, const ImageF& image, const Point
           image.height()};
 }
 
+/// Of what the target shows smaller or larger than the host.
+PatternSpread pattern_spread(const PatternWarp& warp) {
+  const Eigen::Matrix2f to_target = pixel_warp(warp);
+  const float det = to_target(0, 0) * to_target(1, 1) - to_target(0, 1) * to_target(1, 0);
+  const float share = 1.0F / (det * det);
+  return {share * to_target(1, 1) * to_target(1, 1), share * to_target(0, 1) * to_target(0, 1),
+          share * to_target(1, 0) * to_target(1, 0), share * to_target(0, 0) * to_target(0, 0)};
+}
+
 /// What the kernels of a pattern's sums are given.
 PatternInput pattern_input(const PatternBrightness& brightness, const Point& point,
                            const WindowConfig& config, double huber_share, const ImageF& image,
@@ -102,13 +114,18 @@ PatternInput pattern_input(const PatternBrightness& brightness, const Point& poi
           .fy = at.fy.data(),
           .colour = point.colour.data(),
           .weight = point.weight.data(),
+          .bend_u = point.bend_u.data(),
+          .bend_v = point.bend_v.data(),
           .gain = brightness.gain,
           .bias = brightness.bias,
           .frozen_gain = brightness.frozen_gain,
           .frozen_host_b = brightness.frozen_host_b,
           .huber = static_cast<float>(config.huber * huber_share),
           .squared_gradient_constant =
-              static_cast<float>(config.gradient_constant * config.gradient_constant)};
+              static_cast<float>(config.gradient_constant * config.gradient_constant),
+          .spread = at.spread,
+          .point_spread = static_cast<float>(config.point_spread_px * config.point_spread_px),
+          .most_spread = config.equal_blur ? kMostSpread : 0.0F};
 }
 
 void store_totals(const std::array<float, 16>& totals, LinearizedResidual* out) {
@@ -156,7 +173,10 @@ bool sum_blurred_pattern(const Window& window, int host, int target,
   if (!blur->in_host && blur->in_target.places == 1) return false;
 
   PatternInput in = pattern_input(brightness, point, config, window[host].huber_share, image, at);
-  if (blur->in_host) in.colour = blur->colours.data();
+  if (blur->in_host) {
+    in.colour = blur->colours.data();
+    in.most_spread = 0.0F;
+  }
   alignas(32) std::array<float, 16> totals;
   if (blur->in_target.places > 1) {
     SmearedPattern smeared;
@@ -192,6 +212,7 @@ void project_pattern(const Window& window, int host, int target, const Point& po
   out.y = frozen.y() * out.iz;
 
   const PatternWarp warp = pattern_warp(g, image, point, Kt, centre);
+  out.spread = pattern_spread(warp);
   const bool inside =
       run_kernel<PlacePattern>(warp, out.fx.data(), out.fy.data(), out.offset.data());
   const float iz = 1.0F / centre.z();

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "sovo/vo/direct_config.h"
+#include "sovo/vo/pattern_kernels.h"
 #include "sovo/vo/window.h"
 
 namespace sovo {
@@ -34,7 +35,8 @@ struct PatternProjection {
   float centre_u = 0.0F, centre_v = 0.0F, centre_rho = 0.0F;
   float x = 0.0F, y = 0.0F;           ///< Centre in the normalized target image, poses frozen.
   PairViewShift::Displacement shift;  ///< What is added to the translation.
-  float iz = 0.0F, rho = 0.0F;        ///< z_host / z_target; inverse depth in the host [1/m].
+  PatternSpread spread;
+  float iz = 0.0F, rho = 0.0F;  ///< z_host / z_target; inverse depth in the host [1/m].
   bool in_view = false;
 };
 

@@ -78,26 +78,53 @@ struct PlacePattern {
   }
 };
 
+/// How much more a target's image blurs a pattern than its host's does, in variances along the axes
+/// of the host [px^2]: by the cameras' point spread, which is that of a smaller pattern in a
+/// smaller image of it, and by the interpolation in the target, f (1 - f) between two pixels.
+struct PatternSpread {
+  float uu = 1.0F, uv = 0.0F, vu = 0.0F, vv = 1.0F;  ///< (d (host pixel) / d (target pixel))^2.
+};
+
 /// What the residuals of a pattern are made of.
 struct PatternInput {
   const ImageF* image;
   const std::int32_t* offset;  ///< The projected pattern.
   const float *fx, *fy;
-  const float *colour, *weight;  ///< Of the point.
+  const float *colour, *weight;  ///< Of the point,
+  const float *bend_u, *bend_v;  ///< and second differences of its colours.
   float gain, bias;              ///< Host to target.
   float frozen_gain, frozen_host_b;
   float huber, squared_gradient_constant;
+  PatternSpread spread;
+  float point_spread;  ///< Variance of a camera's point spread [px^2].
+  float most_spread;   ///< What is taken of a difference; 0: colours as they are.
 };
+
+/// Colours of pixels k on as the target's image blurs them: convolution with a narrow kernel adds
+/// half its variance times the second derivative.
+template <class F>
+SOVO_LANE_FUNCTION F spread_colours(const PatternInput& in, std::size_t k) {
+  const F fx = load_lane<F>(in.fx + k);
+  const F fy = load_lane<F>(in.fy + k);
+  const F u = fx * (1.0F - fx) + in.point_spread;
+  const F v = fy * (1.0F - fy) + in.point_spread;
+  const F none{};
+  const F most = lane_of<F>(in.most_spread);
+  const PatternSpread& s = in.spread;
+  const F along_u = clamp_lane(F(s.uu * u + s.uv * v - in.point_spread), none, most);
+  const F along_v = clamp_lane(F(s.vu * u + s.vv * v - in.point_spread), none, most);
+  return load_lane<F>(in.colour + k) +
+         0.5F * (along_u * load_lane<F>(in.bend_u + k) + along_v * load_lane<F>(in.bend_v + k));
+}
 
 /// Weighted residuals and Gram matrix of (gx, gy, ja, jb), as many pixels at a time as F has lanes.
 struct PatternSums {
-  /// Those of pixels k on, where the image has these grey levels and gradients.
+  /// Those of pixels k on, of these colours, where the image has these grey levels and gradients.
   template <class F, class Samples>
-  SOVO_LANE_FUNCTION static void add(const PatternInput& in, std::size_t k, const Samples& s,
-                                     F* sums) {
+  SOVO_LANE_FUNCTION static void add(const PatternInput& in, std::size_t k, const F& colour,
+                                     const Samples& s, F* sums) {
     const F c2 = lane_of<F>(in.squared_gradient_constant);
     const F one = lane_of<F>(1.0F);
-    const F colour = load_lane<F>(in.colour + k);
     const F residual = s.value - (in.gain * colour + in.bias);
     const F gradient_squared = s.gx * s.gx + s.gy * s.gy;
     const F w = 0.5F * (sqrt_lane(F(c2 / (c2 + gradient_squared))) + load_lane<F>(in.weight + k));
@@ -124,7 +151,7 @@ struct SumPattern {
     for (std::size_t k = 0; k < kPatternSize; k += lanes_of<F>) {
       const auto s = sample_lanes_with_gradient(*in.image, in.offset + k, load_lane<F>(in.fx + k),
                                                 load_lane<F>(in.fy + k));
-      PatternSums::add(in, k, s, sums);
+      PatternSums::add(in, k, spread_colours<F>(in, k), s, sums);
     }
     store_sums(sums, totals);
     store_sums(sums + 8, totals + 8);
@@ -213,7 +240,8 @@ struct SmearPattern {
   }
 };
 
-/// The sums of a pattern that was smeared; `image`, `offset`, `fx` and `fy` are not looked at.
+/// The sums of a pattern that was smeared; `image`, `offset`, `fx`, `fy` and the spread are not
+/// looked at.
 struct SumSmearedPattern {
   template <class F>
   struct Samples {
@@ -226,7 +254,7 @@ struct SumSmearedPattern {
     for (std::size_t k = 0; k < kPatternSize; k += lanes_of<F>) {
       const Samples<F> s = {load_lane<F>(&smeared.value[k]), load_lane<F>(&smeared.gx[k]),
                             load_lane<F>(&smeared.gy[k])};
-      PatternSums::add(in, k, s, sums);
+      PatternSums::add(in, k, load_lane<F>(in.colour + k), s, sums);
     }
     store_sums(sums, totals);
     store_sums(sums + 8, totals + 8);

@@ -189,12 +189,7 @@ PointActivator::Votes PointActivator::count_votes(const Window& window, int host
 void PointActivator::optimize(const Window& window, double mean_rho, Candidate* candidate) const {
   const Keyframe& host = window[candidate->host];
   const ImmaturePoint& immature = host.immature[candidate->index];
-  Point p;
-  p.u = immature.u;
-  p.v = immature.v;
-  p.colour = immature.colour;
-  p.weight = immature.weight;
-  p.type = immature.type;
+  Point p = point_of(immature);
   p.rho = std::max(0.5 * (static_cast<double>(immature.rho_min) + immature.rho_max), 1e-6);
   p.static_information = immature.static_information;
   p.slope = immature.slope;

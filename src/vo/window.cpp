@@ -172,6 +172,18 @@ double Window::mean_inverse_depth() const {
   return sum > 0.0 ? sum / static_cast<double>(rhos.size()) : 1.0;
 }
 
+Point point_of(const ImmaturePoint& immature) {
+  Point p;
+  p.u = immature.u;
+  p.v = immature.v;
+  p.type = immature.type;
+  p.colour = immature.colour;
+  p.weight = immature.weight;
+  p.bend_u = immature.bend_u;
+  p.bend_v = immature.bend_v;
+  return p;
+}
+
 double depth_information(const Point& point, double rho_unit) {
   if (point.hessian * rho_unit * rho_unit >= kMinRelativeInformation) return point.hessian;
   return std::max(point.hessian, static_cast<double>(point.static_information));

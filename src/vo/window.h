@@ -39,9 +39,11 @@ struct Point {
   float u = 0.0F, v = 0.0F;                  ///< In the host's level 0 [px].
   std::array<float, kPatternSize> colour{};  ///< Host grey levels of the pattern.
   std::array<float, kPatternSize> weight{};  ///< Gradient weights of the pattern.
-  std::uint8_t type = 1;                     ///< Block size of the selection: 1, 2, 4.
-  double rho = 0.0;                          ///< Inverse depth, current estimate [1/m].
-  SurfaceSlope slope;                        ///< Of what it lies on; (0, 0): not known.
+  /// Second differences of the colours along both axes: what blur adds to them.
+  std::array<float, kPatternSize> bend_u{}, bend_v{};
+  std::uint8_t type = 1;            ///< Block size of the selection: 1, 2, 4.
+  double rho = 0.0;                 ///< Inverse depth, current estimate [1/m].
+  SurfaceSlope slope;               ///< Of what it lies on; (0, 0): not known.
   double hessian = 0.0;             ///< H_rho_rho of the newest linearization, without priors.
   double gradient = 0.0;            ///< b_rho.
   float static_information = 0.0F;  ///< As `hessian`, of the match that gave rho first; 0: none.
@@ -62,6 +64,9 @@ struct Point {
     return n;
   }
 };
+
+/// A point that shows what an immature one does; its depth is not set.
+Point point_of(const ImmaturePoint& immature);
 
 /// Information on a point's log-depth, in squared grey levels of the weighted pattern, below which
 /// parallax tells nothing about it.

@@ -20,23 +20,44 @@ struct PlainSums {
   double rr = 0.0, energy = 0.0;
 };
 
+/// Where a pixel of the host is seen in the target.
+Vec2 plain_projection(const PairGeometry& g, const Point& point, const Vec2& pixel) {
+  const Vec3 p = g.KRKi.cast<double>() * pixel.homogeneous() + g.Kt.cast<double>() * point.rho;
+  return p.hnormalized();
+}
+
+/// What colour `i` of a point is in the target's image, which is blurred by interpolation and, by
+/// what it shows smaller, by the point spread: variances along the host's axes [px^2].
+double plain_colour(const PairGeometry& g, const WindowConfig& config, const Point& point,
+                    std::size_t i, const Vec2& seen) {
+  const Vec2 centre(point.u, point.v);
+  const auto move = [&](const Vec2& pixel) { return plain_projection(g, point, pixel); };
+  const Mat2 to_host = central_differences<2, 2>(move, centre).inverse();
+  const double point_spread = config.point_spread_px * config.point_spread_px;
+  const Vec2 f = seen - seen.array().floor().matrix();
+  const Vec2 variance = f - f.cwiseAbs2() + Vec2::Constant(point_spread);
+  const Vec2 more =
+      (to_host.cwiseAbs2() * variance - Vec2::Constant(point_spread)).cwiseMax(0.0).cwiseMin(0.5);
+  return point.colour[i] + 0.5 * (more.x() * point.bend_u[i] + more.y() * point.bend_v[i]);
+}
+
 PlainSums plain_sums(const Window& window, const WindowConfig& config, int host, int target,
                      const Point& point) {
   const PairGeometry& g = window.pair(host, target);
   const double c2 = config.gradient_constant * config.gradient_constant;
   PlainSums out;
   for (std::size_t i = 0; i < kPatternSize; ++i) {
-    const Vec3 ray(point.u + kPattern[i].x, point.v + kPattern[i].y, 1.0);
-    const Vec3 p = g.KRKi.cast<double>() * ray + g.Kt.cast<double>() * point.rho;
-    const Sample s = sample_with_gradient(window[target].image(), static_cast<float>(p.x() / p.z()),
-                                          static_cast<float>(p.y() / p.z()));
+    const Vec2 p = plain_projection(g, point, {point.u + kPattern[i].x, point.v + kPattern[i].y});
+    const Sample s = sample_with_gradient(window[target].image(), static_cast<float>(p.x()),
+                                          static_cast<float>(p.y()));
     const double gain = g.gain;
-    const double r = s.value - (gain * point.colour[i] + g.bias);
+    const double colour = plain_colour(g, config, point, i, p);
+    const double r = s.value - (gain * colour + g.bias);
     const double huber = std::abs(r) < config.huber ? 1.0 : config.huber / std::abs(r);
     const double gradient = static_cast<double>(s.gx) * s.gx + static_cast<double>(s.gy) * s.gy;
     const double w = 0.5 * (std::sqrt(c2 / (c2 + gradient)) + point.weight[i]);
     const double frozen_gain = g.frozen_gain;
-    const Vec4 J(s.gx, s.gy, -frozen_gain * (point.colour[i] - g.frozen_host_b), -1.0);
+    const Vec4 J(s.gx, s.gy, -frozen_gain * (colour - g.frozen_host_b), -1.0);
     out.gram += huber * w * w * J * J.transpose();
     out.gram_r += huber * w * w * J * r;
     out.rr += huber * w * w * r * r;

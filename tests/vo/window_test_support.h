@@ -60,11 +60,7 @@ inline Point make_point(const ImageF& image, int u, int v, double rho) {
   const WindowConfig config;
   make_immature_point(image, static_cast<float>(u), static_cast<float>(v), 1, PointConfig(),
                       config.gradient_constant, &immature);
-  Point p;
-  p.u = immature.u;
-  p.v = immature.v;
-  p.colour = immature.colour;
-  p.weight = immature.weight;
+  Point p = point_of(immature);
   p.rho = rho;
   return p;
 }

@@ -11,6 +11,7 @@
 #include "sovo/geometry/camera_model.h"
 #include "sovo/geometry/se3.h"
 #include "sovo/image/image.h"
+#include "support/sine_sum.h"
 
 namespace sovo::test {
 
@@ -34,7 +35,6 @@ class ProceduralTexture {
   /// Wavelengths in [m]; `waves` sinusoids.
   ProceduralTexture(std::mt19937& random, double min_wavelength, double max_wavelength,
                     int waves = 40) {
-    waves_.reserve(static_cast<std::size_t>(waves));
     double energy = 0.0;
     for (int i = 0; i < waves; ++i) {
       const double wavelength =
@@ -43,24 +43,17 @@ class ProceduralTexture {
       const double frequency = 2.0 * M_PI / wavelength;
       const double amplitude = std::pow(wavelength, 0.3);
       energy += 0.5 * amplitude * amplitude;
-      waves_.push_back({frequency * std::cos(direction), frequency * std::sin(direction),
-                        uniform(random, 0.0, 2.0 * M_PI), amplitude});
+      waves_.add(frequency * std::cos(direction), frequency * std::sin(direction),
+                 uniform(random, 0.0, 2.0 * M_PI), amplitude);
     }
-    for (Wave& wave : waves_) wave.amplitude *= 0.55 / std::sqrt(energy);
+    waves_.scale(0.55 / std::sqrt(energy));
   }
 
   /// Grey level at plane coordinates [m].
-  double operator()(double s, double t) const {
-    double sum = 0.0;
-    for (const Wave& w : waves_) sum += w.amplitude * std::sin(w.ks * s + w.kt * t + w.phase);
-    return 127.5 + 110.0 * std::tanh(sum);
-  }
+  double operator()(double s, double t) const { return 127.5 + 110.0 * std::tanh(waves_(s, t)); }
 
  private:
-  struct Wave {
-    double ks, kt, phase, amplitude;
-  };
-  std::vector<Wave> waves_;
+  SineSum waves_;
 };
 
 /// A closed room of textured planes with two boxes in it, rendered exactly by ray casting. World
@@ -83,7 +76,8 @@ class SyntheticScene {
     wall({4, 0, 0}, {-1, 0, 0}, {0, 0, 1}, 0.2);      // right
     wall({0, 0, -4}, {0, 0, 1}, {1, 0, 0}, 0.15);     // behind
     const auto box = [&](const Vec3& center, double yaw, const Vec3& half) {
-      boxes_.push_back({SE3(SO3::exp(Vec3(0, yaw, 0)), center).inverse(), half, {}});
+      const SE3 T_box_world = SE3(SO3::exp(Vec3(0, yaw, 0)), center).inverse();
+      boxes_.push_back({T_box_world.rotation_matrix(), T_box_world.translation(), half, {}});
       for (int i = 0; i < 6; ++i) boxes_.back().faces.emplace_back(random, 0.05, 0.8);
     };
     box({-0.75, 0.75, 2.3}, 0.5, {0.45, 0.65, 0.45});
@@ -136,13 +130,15 @@ class SyntheticScene {
   ImageF render(const CameraModel& camera, const SE3& T_world_camera,
                 ImageF* depth = nullptr) const {
     ImageF image(camera.width, camera.height);
+    const Mat3 R_world_camera = T_world_camera.rotation_matrix();
     if (depth != nullptr) depth->resize(camera.width, camera.height);
     for (int y = 0; y < camera.height; ++y) {
       for (int x = 0; x < camera.width; ++x) {
         const auto ray = camera.unproject(Vec2(x, y));
         const Vec3 offset = ray ? camera.ray_offset(*ray) : Vec3(Vec3::Zero());
-        const Hit hit =
-            ray ? cast(T_world_camera * offset, T_world_camera.rotation() * *ray) : Hit{};
+        const Hit hit = ray ? cast(R_world_camera * offset + T_world_camera.translation(),
+                                   R_world_camera * *ray)
+                            : Hit{};
         image.at(x, y) = static_cast<float>(hit.value);
         if (depth != nullptr) {
           depth->at(x, y) = ray ? static_cast<float>(offset.z() + hit.distance * ray->z()) : 0.0F;
@@ -158,14 +154,15 @@ class SyntheticScene {
     ProceduralTexture texture;
   };
   struct Box {
-    SE3 T_box_world;
+    Mat3 R_box_world;
+    Vec3 world_in_box;
     Vec3 half;
     std::vector<ProceduralTexture> faces;
   };
 
   static std::optional<Hit> cast_box(const Box& box, const Vec3& origin, const Vec3& direction) {
-    const Vec3 o = box.T_box_world * origin;
-    const Vec3 d = box.T_box_world.rotation() * direction;
+    const Vec3 o = box.R_box_world * origin + box.world_in_box;
+    const Vec3 d = box.R_box_world * direction;
     double enter = -std::numeric_limits<double>::max();
     double leave = std::numeric_limits<double>::max();
     int axis = 0;

@@ -142,6 +142,9 @@ Result<void> check_window(const DirectConfig& vo) {
   if (vo.tracker.max_levels < 1) return Error{"vo.tracker.max_levels must be at least 1"};
   if (vo.window.max_iterations < 1) return Error{"vo.window.max_iterations must be at least 1"};
   if (vo.window.lens_every < 0) return Error{"vo.window.lens_every must not be negative"};
+  if (!(vo.window.point_spread_px >= 0.0 && vo.window.point_spread_px <= 3.0)) {
+    return Error{"vo.window.point_spread_px must be 0 to 3"};
+  }
   const std::pair<const char*, double> thresholds[] = {
       {"tracker.huber", vo.tracker.huber},
       {"tracker.cutoff", vo.tracker.cutoff},

@@ -56,6 +56,7 @@ class Configuration(CommandTest):
                            "vo.keyframe.max_keyframes=9", "vo.keyframe.max_keyframes=2",
                            "vo.keyframe.min_keyframes=0", "vo.points.active_points=0",
                            "vo.tracker.max_levels=0", "vo.window.max_iterations=0",
+                           "vo.window.point_spread_px=-0.1", "vo.window.point_spread_px=nan",
                            "vo.window.huber=0", "vo.tracker.gradient_constant=0",
                            "vo.weak_texture.least_rms=-1", "vo.selection.min_spread=1",
                            "lighting=lamp", "local_contrast.radius=0", "local_contrast.floor=0",

@@ -68,7 +68,7 @@ struct KeyframeConfig {
   double flow_translation = 0.006;
   double flow_total = 0.012;
   double max_translation_flow = 67.0;
-  double approach = 4.3;
+  double approach = 3.2;
   double brightness = 2.0;
   double rmse_factor = 2.0;
   double rmse_min_score = 0.13;
@@ -86,7 +86,9 @@ struct KeyframeConfig {
     v("flow_total", flow_total, "weight of the flow");
     v("max_translation_flow", max_translation_flow,
       "what the translation adds to the flow of a point counts as no more [px of a VGA image]");
-    v("approach", approach, "weight of the motion along the view, in depths of the points");
+    v("approach", approach,
+      "weight of the motion along the view, in depths of the points, of which near ones count "
+      "more");
     v("brightness", brightness, "weight of the change of log-gain");
     v("rmse_factor", rmse_factor, "a keyframe is made above this x the first residual");
     v("rmse_min_score", rmse_min_score, "weighted sum below which no residual makes a keyframe");

@@ -8,17 +8,41 @@ namespace sovo {
 namespace {
 
 constexpr std::size_t kLeastPoints = 256;  ///< Of more, every second, third, ... is looked at.
+constexpr double kMostWeight = 4.0;        ///< Of a near point in the approach, over the mean.
+
+std::size_t stride_of(const ReferenceLevel& points) {
+  return std::max<std::size_t>(1, points.size() / kLeastPoints);
+}
 
 Vec2 clipped(const Vec2& flow, double most) {
   const double length = flow.norm();
   return length > most ? Vec2(most / length * flow) : flow;
 }
 
+/// Mean of the points' motions along the view in their own depths, weighted with inverse depths: on
+/// open roads most points are far and hardly move, and the few near ones, which alone tell how far
+/// one went, leave the view before a mean of all calls for a keyframe to follow them from.
+double approach_of(const ReferenceLevel& points, double along_view) {
+  const std::size_t stride = stride_of(points);
+  double sum = 0.0;
+  int n = 0;
+  for (std::size_t i = 0; i < points.size(); i += stride, ++n) sum += points.rho[i];
+  const double most = kMostWeight * sum / std::max(1, n);
+  double approach = 0.0;
+  double weights = 0.0;
+  for (std::size_t i = 0; i < points.size(); i += stride) {
+    const double weight = std::min<double>(points.rho[i], most);
+    approach += weight * points.rho[i] * std::abs(along_view);
+    weights += weight;
+  }
+  return weights > 0.0 ? approach / weights : 0.0;
+}
+
 }  // namespace
 
 PointMotion motion_of_points(const ReferenceLevel& points, const SE3& T_current_reference,
                              double max_translation) {
-  const std::size_t stride = std::max<std::size_t>(1, points.size() / kLeastPoints);
+  const std::size_t stride = stride_of(points);
   const Mat3 K = points.camera.matrix();
   const Mat3 KRKi = K * T_current_reference.rotation_matrix() * K.inverse();
   const Vec3 Kt = K * T_current_reference.translation();
@@ -35,11 +59,11 @@ PointMotion motion_of_points(const ReferenceLevel& points, const SE3& T_current_
       sum.flow_translation += clipped(straight, max_translation).squaredNorm();
       sum.flow_total += (rotation + clipped(translation, max_translation)).squaredNorm();
     }
-    sum.approach += 2.0 * std::abs(kt.z());
     n += 2;
   }
   if (n == 0) return {};
-  return {std::sqrt(sum.flow_translation / n), std::sqrt(sum.flow_total / n), sum.approach / n};
+  return {std::sqrt(sum.flow_translation / n), std::sqrt(sum.flow_total / n),
+          approach_of(points, T_current_reference.translation().z())};
 }
 
 }  // namespace sovo

@@ -9,7 +9,9 @@ namespace sovo {
 struct PointMotion {
   double flow_translation = 0.0;  ///< RMS flow without the rotation [px].
   double flow_total = 0.0;        ///< RMS flow [px].
-  double approach = 0.0;  ///< Mean motion along the view, to and fro alike, in the points' depths.
+  /// Mean motion along the view, to and fro alike, in the points' depths, of which near ones count
+  /// more.
+  double approach = 0.0;
 };
 
 /// That of `T_current_reference` (the flows as in DSO, Sec. 3.1, "keyframe creation"). What the

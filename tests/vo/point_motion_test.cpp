@@ -52,6 +52,25 @@ TEST(MotionOfPoints, NearPointsDoNotStandForTheOthers) {
   EXPECT_NEAR(clipped.flow_translation, 4.455, 1e-3);
 }
 
+TEST(MotionOfPoints, TheFewNearPointsOfAnOpenRoadCountMore) {
+  // One in ten is near; all the others hardly move.
+  std::vector<float> rho(100, 0.01F);
+  for (std::size_t i = 0; i < rho.size(); i += 10) rho[i] = 0.06F;
+  const SE3 ahead(SO3(), Vec3(0, 0, -2.0));
+  // 2 m times the mean of rho squared over that of rho; a mean of all would have 0.03.
+  EXPECT_NEAR(motion_of_points(points_of(rho), ahead, kUnclipped).approach, 0.06, 1e-6);
+}
+
+TEST(MotionOfPoints, OnePointThatIsAlmostTouchedDoesNotStandForAllOthers) {
+  std::vector<float> rho(100, 0.1F);
+  rho[50] = 10.0F;
+  const SE3 ahead(SO3(), Vec3(0, 0, -0.1));
+  // It weighs as much as eight others, not as a hundred.
+  const double of_it = 4.0 * 0.199;
+  EXPECT_NEAR(motion_of_points(points_of(rho), ahead, kUnclipped).approach,
+              (9.9 * 0.01 + of_it * 1.0) / (9.9 + of_it), 1e-6);
+}
+
 TEST(MotionOfPoints, ATurnCountsInFullWhateverIsClipped) {
   const ReferenceLevel points = points_of(std::vector<float>(100, 0.25F));
   const SE3 turn(SO3::exp(Vec3(0, 0.3, 0)), Vec3::Zero());

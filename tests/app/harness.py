@@ -10,7 +10,7 @@ import sys
 import tempfile
 import unittest
 
-from trajectory import largest_error, read_tum, rotate_back  # noqa: F401
+from trajectory import largest_error, largest_step_error, read_tum, rotate_back  # noqa: F401
 
 SOVO = os.environ["SOVO"]
 DATASET = os.environ["SOVO_SYNTHETIC"]

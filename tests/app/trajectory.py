@@ -38,3 +38,10 @@ def largest_error(estimate, truth, origin):
         seen = rotate_back(r0, [a - b for a, b in zip(p, e0)])
         worst = max(worst, math.dist(expected, seen))
     return worst
+
+
+def largest_step_error(estimate, truth):
+    """Largest error of the way from one pose to the next [m]; both have the same stamps."""
+    ways = [[math.dist(a[1], b[1]) for a, b in zip(poses, poses[1:])]
+            for poses in (estimate, truth)]
+    return max(abs(a - b) for a, b in zip(*ways))

@@ -105,13 +105,16 @@ std::optional<LensEvidence> LensEquations::evidence(const NormalEquations& syste
   const int n = window_.size();
   // J_x^T [J_c, r] of the states.
   MatX right = MatX::Zero(Eigen::Index{8} * n, 3);
+  const double mean_rho = window_.mean_inverse_depth();
   double squared_turns = 0.0;
+  double squared_ways = 0.0;
   int residuals = 0;
   for (int h = 0; h < n; ++h) {
     for (int t = 0; t < n; ++t) {
       if (h == t) continue;
       const Pair& pair = pairs_[pair_of(h, t)];
       squared_turns += pair.residuals * squared_turn(window_, h, t);
+      squared_ways += pair.residuals * std::pow(mean_rho * window_.pair(h, t).distance, 2);
       residuals += pair.residuals;
       Eigen::Matrix<double, 8, 3> relative;
       relative << pair.cross, pair.gradient;
@@ -129,6 +132,7 @@ std::optional<LensEvidence> LensEquations::evidence(const NormalEquations& syste
   const MatX solved = solve_symmetric_columns(H, right);
   LensEvidence out;
   out.turn = std::sqrt(squared_turns / std::max(1, residuals));
+  out.way = std::sqrt(squared_ways / std::max(1, residuals));
   out.H = H_ - right.leftCols<2>().transpose() * solved.leftCols<2>();
   out.b = b_ - right.leftCols<2>().transpose() * solved.col(2);
   const bool tells = out.H.allFinite() && out.b.allFinite() && out.H(0, 0) > 0.0 &&

@@ -15,7 +15,9 @@ namespace {
 constexpr double kFocalError = 1e-3;
 constexpr double kRadialError = 1e-3;
 
-bool turns_enough(const LensEvidence& keyframe) { return keyframe.turn >= kLeastLensTurn; }
+bool turns_enough(const LensEvidence& keyframe) {
+  return keyframe.turn >= std::max(kLeastLensTurn, kLeastLensTurnOnWay * keyframe.way);
+}
 
 /// A keyframe is as sure as it can be.
 LensEvidence tempered(const LensEvidence& keyframe) {

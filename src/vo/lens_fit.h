@@ -18,6 +18,7 @@ struct LensEvidence {
   Vec2 b = Vec2::Zero();
   /// Angle between the optical axes of the keyframes of a residual: root of the mean square [rad].
   double turn = 0.0;
+  double way = 0.0;  ///< Distance between those keyframes, likewise [mean depths].
 
   void weigh(double factor) {
     H *= factor;
@@ -28,6 +29,9 @@ struct LensEvidence {
 /// Turns tell a focal length. Where cameras turn less than this between keyframes [rad], those of a
 /// right lens see one that is up to 2 % shorter, one after the other.
 inline constexpr double kLeastLensTurn = 0.14;
+/// And less than this on the way of a mean depth [rad] is a bend of the road that they are driven
+/// along; in the turns of streets and flights it is 0.2 to 2, on bends of highways 0.05.
+inline constexpr double kLeastLensTurnOnWay = 0.1;
 
 /// A lens as keyframes agree about it, and how sure that is.
 struct LensFit {

@@ -106,9 +106,10 @@ TEST(LensEquations, SeeAWrongFocalLength) {
   }
 }
 
-TEST(LensEquations, TellHowFarTheViewTurns) {
+TEST(LensEquations, TellHowFarTheViewTurnsAndMoves) {
   Window window = turned_window(small_camera());
   double squares = 0.0;
+  double ways = 0.0;
   int pairs = 0;
   for (int h = 0; h + 1 < window.size(); ++h) {
     for (int t = 0; t < window.size(); ++t) {
@@ -116,12 +117,17 @@ TEST(LensEquations, TellHowFarTheViewTurns) {
       const Vec3 a = window[h].T_world_camera().rotation_matrix().col(2);
       const Vec3 b = window[t].T_world_camera().rotation_matrix().col(2);
       squares += std::pow(std::acos(a.dot(b)), 2);
+      ways += (window[h].T_world_camera().translation() - window[t].T_world_camera().translation())
+                  .squaredNorm();
       ++pairs;
     }
   }
   const double expected = std::sqrt(squares / pairs);
   EXPECT_GT(expected, 0.1);
-  EXPECT_NEAR(shown_by(&window).turn, expected, 0.1 * expected);
+  const double way = std::sqrt(ways / pairs) * window.mean_inverse_depth();
+  const LensEvidence shown = shown_by(&window);
+  EXPECT_NEAR(shown.turn, expected, 0.1 * expected);
+  EXPECT_NEAR(shown.way, way, 0.1 * way);
 }
 
 TEST(LensEquations, AreAskedOfOneInSoManyKeyframes) {

@@ -120,6 +120,12 @@ TEST(LensWatch, IsSilentWhereATenthOfTheKeyframesMakesItAll) {
 TEST(LensWatch, IsSilentOnStraightRoads) {
   EXPECT_EQ(watched(keyframes_that_turn(0.12, -0.03, 200)), 0.0);
   EXPECT_NE(watched(keyframes_that_turn(0.16, -0.03, 200)), 0.0);
+  // A bend of the road, over several mean depths, is none.
+  auto bend = keyframes_that_turn(0.2, -0.03, 200);
+  for (LensEvidence& keyframe : bend) keyframe.way = 2.1;
+  EXPECT_EQ(watched(bend), 0.0);
+  for (LensEvidence& keyframe : bend) keyframe.way = 1.9;
+  EXPECT_NE(watched(bend), 0.0);
 }
 
 TEST(LensWatch, RemembersWhatWasClear) {

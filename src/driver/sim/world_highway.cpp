@@ -122,7 +122,7 @@ class HighwayBuilder {
       strip(p, kEdge, kOpposite, z - 0.012, length, m_.verge);
       strip(p, kShoulder, kEdge, z, length, m_.asphalt);
       strip(p, kOpposite, kOpposite + kOppositeWidth, z, length, m_.asphalt);
-      const double line_z = z + 0.012;
+      const double line_z = z + 0.003;
       strip(p, -0.5 * kLane - 0.2, -0.5 * kLane + 0.1, line_z, length, m_.line);
       strip(p, 1.5 * kLane, 1.5 * kLane + 0.25, line_z, length, m_.line);
       strip(p, kOpposite + 0.5, kOpposite + 0.75, line_z, length, m_.line);

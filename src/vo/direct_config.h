@@ -68,7 +68,7 @@ struct KeyframeConfig {
   double flow_translation = 0.006;
   double flow_total = 0.012;
   double max_translation_flow = 67.0;
-  double approach = 3.2;
+  double approach = 4.3;
   double brightness = 2.0;
   double rmse_factor = 2.0;
   double rmse_min_score = 0.13;

@@ -9,6 +9,7 @@ namespace {
 
 constexpr std::size_t kLeastPoints = 256;  ///< Of more, every second, third, ... is looked at.
 constexpr double kMostWeight = 4.0;        ///< Of a near point in the approach, over the mean.
+constexpr double kNearShare = 0.75;        ///< What the approach weighted like that counts.
 
 std::size_t stride_of(const ReferenceLevel& points) {
   return std::max<std::size_t>(1, points.size() / kLeastPoints);
@@ -19,23 +20,25 @@ Vec2 clipped(const Vec2& flow, double most) {
   return length > most ? Vec2(most / length * flow) : flow;
 }
 
-/// Mean of the points' motions along the view in their own depths, weighted with inverse depths: on
-/// open roads most points are far and hardly move, and the few near ones, which alone tell how far
-/// one went, leave the view before a mean of all calls for a keyframe to follow them from.
+/// Mean of the points' motions along the view in their own depths; or, where that is more, a share
+/// of the same weighted with inverse depths: on open roads most points are far and hardly move, and
+/// the few near ones, which alone tell how far one went, leave the view before a mean of all calls
+/// for a keyframe to follow them from.
 double approach_of(const ReferenceLevel& points, double along_view) {
   const std::size_t stride = stride_of(points);
   double sum = 0.0;
-  int n = 0;
+  double n = 0.0;
   for (std::size_t i = 0; i < points.size(); i += stride, ++n) sum += points.rho[i];
-  const double most = kMostWeight * sum / std::max(1, n);
-  double approach = 0.0;
+  if (!(sum > 0.0)) return 0.0;
+  const double most = kMostWeight * sum / n;
+  double weighted = 0.0;
   double weights = 0.0;
   for (std::size_t i = 0; i < points.size(); i += stride) {
     const double weight = std::min<double>(points.rho[i], most);
-    approach += weight * points.rho[i] * std::abs(along_view);
+    weighted += weight * points.rho[i];
     weights += weight;
   }
-  return weights > 0.0 ? approach / weights : 0.0;
+  return std::abs(along_view) * std::max(sum / n, kNearShare * weighted / weights);
 }
 
 }  // namespace

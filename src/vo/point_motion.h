@@ -10,7 +10,7 @@ struct PointMotion {
   double flow_translation = 0.0;  ///< RMS flow without the rotation [px].
   double flow_total = 0.0;        ///< RMS flow [px].
   /// Mean motion along the view, to and fro alike, in the points' depths, of which near ones count
-  /// more.
+  /// more where they are few.
   double approach = 0.0;
 };
 

@@ -37,8 +37,8 @@ TEST_F(KeyframeDecision, FlowOrBrightnessAloneSuffices) {
 }
 
 TEST_F(KeyframeDecision, MotionAlongTheViewSufficesWhereItMakesLittleFlow) {
-  EXPECT_FALSE(wanted(5.0, 1.0, 0.0, 0.28));
-  EXPECT_TRUE(wanted(5.0, 1.0, 0.0, 0.29));
+  EXPECT_FALSE(wanted(5.0, 1.0, 0.0, 0.20));
+  EXPECT_TRUE(wanted(5.0, 1.0, 0.0, 0.22));
 }
 
 TEST_F(KeyframeDecision, ABadFitMakesOneWhereThereIsParallax) {

@@ -188,8 +188,8 @@ void FramePreparation::write_left(const SideImage& left, const Vec3& turn, Image
 }
 
 LightObservers FramePreparation::light_observers() const {
-  if (left_contrast_) return {.known = false};
-  return {vignette_estimate_.get(), moving_light_.get(), vignette_estimate_ == nullptr};
+  if (left_contrast_) return {};
+  return {vignette_estimate_.get(), moving_light_.get()};
 }
 
 void FramePreparation::take_light_out(bool out) {

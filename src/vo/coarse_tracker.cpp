@@ -84,6 +84,10 @@ ReferenceLevel thinned(const ReferenceLevel& all, std::size_t most) {
   return out;
 }
 
+RobustNorm norm_for(const TrackerConfig& config, const TrackingReference& reference) {
+  return {reference.threshold_share * config.huber, reference.threshold_share * config.cutoff};
+}
+
 /// Prior on a frame's brightness: that of the reference.
 struct BrightnessPrior {
   Vec8 weight = Vec8::Zero();
@@ -253,23 +257,21 @@ void CoarseTracker::normal_equations(const BrightnessTransfer& transfer, double 
   }
 }
 
-RobustNorm robust_norm(const TrackerConfig& config, const TrackingReference& reference) {
-  return {reference.threshold_share * config.huber, reference.threshold_share * config.cutoff};
-}
-
 CoarseTracker::Fit CoarseTracker::fit(const TrackingReference& reference, const ImageF& image,
                                       const SE3& T, const BrightnessTransfer& transfer) {
   Linearization out;
-  residuals(reference.levels[0], image, T, transfer, robust_norm(config_, reference), &out);
+  residuals(reference.levels[0], image, T, transfer, norm_for(config_, reference), &out);
   return {out.saturated, out.energy};
 }
 
-double CoarseTracker::unexplained(const TrackingReference& reference, const ImageF& image,
-                                  double exposure_s, TrackingResult pose) {
-  const BrightnessTransfer transfer =
-      brightness_transfer(reference.affine, reference.exposure_s, pose.affine, exposure_s);
-  const double energy = fit(reference, image, pose.T_current_reference, transfer).energy;
-  compare(reference.levels[0], image, &pose);
+double CoarseTracker::unexplained(const TrackingReference& reference, const ReferenceLevel& points,
+                                  const ImageF& image, double exposure_s, TrackingResult pose) {
+  Linearization out;
+  const double energy = residuals(
+      points, image, pose.T_current_reference,
+      brightness_transfer(reference.affine, reference.exposure_s, pose.affine, exposure_s),
+      norm_for(config_, reference), &out);
+  compare(points, image, &pose);
   return std::sqrt(energy) / std::max(pose.correlation * pose.correlation, 1e-6);
 }
 
@@ -347,7 +349,7 @@ TrackingResult CoarseTracker::try_hypothesis(const TrackingReference& reference,
   TrackingResult result;
   result.T_current_reference = start;
   result.affine = guess;
-  const RobustNorm usual = robust_norm(config_, reference);
+  const RobustNorm usual = norm_for(config_, reference);
   bool repeated = false;
   LevelOutcome outcome;
   for (int l = levels - 1; l >= 0; --l) {
@@ -428,13 +430,13 @@ double CoarseTracker::score_as_it_is(const TrackingReference& reference, int lev
   const BrightnessTransfer transfer =
       brightness_transfer(reference.affine, reference.exposure_s, affine, exposure_s);
   Linearization at;
-  const double energy = residuals(points, image, T, transfer, robust_norm(config_, reference), &at);
+  const double energy = residuals(points, image, T, transfer, norm_for(config_, reference), &at);
   return badness(std::sqrt(energy), at.inliers, points.size());
 }
 
 double CoarseTracker::score_aligned(const TrackingReference& reference, int level,
                                     const ImageF& image, double exposure_s, Affine affine, SE3* T) {
-  RobustNorm norm = robust_norm(config_, reference);
+  RobustNorm norm = norm_for(config_, reference);
   const LevelOutcome o =
       align_level(reference, level, image, exposure_s, &norm, T, &affine, kRankIterations);
   if (!o.finite) return kExplainsNothing;
@@ -453,7 +455,7 @@ std::vector<SE3> CoarseTracker::likeliest(const TrackingReference& reference,
     Linearization at;
     ranked.push_back(
         {residuals(reference.levels[static_cast<std::size_t>(level)], pyramid.level(level), T,
-                   transfer, robust_norm(config_, reference), &at),
+                   transfer, norm_for(config_, reference), &at),
          T});
   }
   sort_best_first(&ranked);

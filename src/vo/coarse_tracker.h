@@ -38,9 +38,6 @@ struct RobustNorm {
   double cutoff = 20.0;
 };
 
-/// That of tracking against a reference, which has less where there is little texture.
-RobustNorm robust_norm(const TrackerConfig& config, const TrackingReference& reference);
-
 /// Direct image alignment of a frame with the tracking reference: pose (6) and affine brightness
 /// (2), Levenberg-Marquardt from the coarsest level to the finest (DSO, Sec. 3.1, "frame
 /// tracking").
@@ -81,11 +78,11 @@ class CoarseTracker {
   Fit fit(const TrackingReference& reference, const ImageF& image, const SE3& T_current_reference,
           const BrightnessTransfer& transfer);
 
-  /// The robust residuals of a pose over the points of level 0, for the share of the variance of
+  /// The robust residuals of a pose over some points of level 0, for the share of the variance of
   /// their brightness that it explains [grey levels]. Those residuals alone hardly tell a wrong
   /// place from the right one: what does not agree there counts no more than the cutoff.
-  double unexplained(const TrackingReference& reference, const ImageF& image, double exposure_s,
-                     TrackingResult pose);
+  double unexplained(const TrackingReference& reference, const ReferenceLevel& points,
+                     const ImageF& image, double exposure_s, TrackingResult pose);
 
   /// One linearization for tests: 8x8 normal matrix, gradient and mean energy at a level.
   struct Linearization {

@@ -9,7 +9,6 @@
 #include "sovo/vo/image_change.h"
 #include "sovo/vo/keyframe_policy.h"
 #include "sovo/vo/motion_hypotheses.h"
-#include "sovo/vo/pattern_fit.h"
 #include "sovo/vo/staying_cells.h"
 
 namespace sovo {
@@ -159,17 +158,13 @@ TrackingResult DirectOdometry::track_likely(const TrackingReference& reference,
 /// leads to the right one, and what tells is how well the patterns around all points fit.
 TrackingResult DirectOdometry::search_ahead(const TrackingReference& reference,
                                             const MonoFrame& frame, TrackingResult found) {
-  const ImageF& image = frame.pyramid->level(0);
   const bool rolling = !reference.shift.none() || !frame.shift.none();
-  std::optional<ReferencePatterns> patterns;
-  if (!rolling) patterns.emplace(reference.levels[0], reference.pyramid->level(0));
+  const ReferenceLevel patterns =
+      rolling ? reference.levels[0]
+              : with_patterns(reference.levels[0], reference.pyramid->level(0));
   const auto unexplained = [&](const TrackingResult& pose) {
-    if (!patterns) return tracker_.unexplained(reference, image, frame.exposure_s, pose);
-    const KnownLight light{
-        brightness_transfer(reference.affine, reference.exposure_s, pose.affine, frame.exposure_s),
-        light_.known};
-    return patterns->unexplained(image, pose.T_current_reference, light,
-                                 robust_norm(config_.tracker, reference));
+    return tracker_.unexplained(reference, patterns, frame.pyramid->level(0), frame.exposure_s,
+                                pose);
   };
   double least = unexplained(found);
   const SE3 turn(found.T_current_reference.rotation(), Vec3::Zero());

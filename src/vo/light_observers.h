@@ -9,9 +9,6 @@ class VignetteEstimate;
 struct LightObservers {
   VignetteEstimate* vignette = nullptr;
   MovingLight* moving = nullptr;
-  /// Whether images are freed of all that changes brightness from place to place in them: with a
-  /// vignette that is known, by the light of the world.
-  bool known = true;
 };
 
 }  // namespace sovo

@@ -310,6 +310,24 @@ TrackingReference build_tracking_reference(const Window& window, std::span<const
   return ref;
 }
 
+ReferenceLevel with_patterns(const ReferenceLevel& points, const ImageF& image) {
+  ReferenceLevel out;
+  out.camera = points.camera;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    for (const PatternOffset& o : kPattern) {
+      const float u = points.u[i] + o.x;
+      const float v = points.v[i] + o.y;
+      if (!in_image(image, u, v)) continue;
+      out.u.push_back(u);
+      out.v.push_back(v);
+      out.rho.push_back(points.rho[i]);
+      out.colour.push_back(image.at(static_cast<int>(u), static_cast<int>(v)));
+      out.weight.push_back(points.weight[i]);
+    }
+  }
+  return out;
+}
+
 double lower_gradient(const ImageF& image, std::span<const float> u, std::span<const float> v) {
   std::vector<float> squared;
   squared.reserve(u.size());

@@ -55,6 +55,10 @@ std::vector<SeenPoint> matched_points(const Window& window);
 TrackingReference build_tracking_reference(const Window& window, std::span<const SeenPoint> points,
                                            int num_levels, double gradient_constant);
 
+/// The pixels of the patterns around points of an image, at their depths. Precondition: the points
+/// are pixels of it.
+ReferenceLevel with_patterns(const ReferenceLevel& points, const ImageF& image);
+
 /// Gradient that a quarter of some pixels remain below [grey levels/px]. Precondition: there are
 /// some, and none is at the image's edge.
 double lower_gradient(const ImageF& image, std::span<const float> u, std::span<const float> v);

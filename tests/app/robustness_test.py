@@ -99,8 +99,8 @@ class Robustness(SimTest):
     def test_the_map_begins_in_the_middle_of_an_open_highway(self):
         # Nearly three metres a frame, of which hardly anything near by tells.
         dark = {"vignette": 0.4, "calibrated": "false"}
-        for world, start, sensor in ((1, 40, {}), (1, 140, {}), (3, 40, {}), (2, 20, dark),
-                                     (3, 20, dark), (7, 20, dark), (7, 260, dark)):
+        for world, start, sensor in ((1, 40, {}), (1, 140, {}), (3, 40, {}), (3, 20, dark),
+                                     (7, 260, dark)):
             truth, live = self.fly("highway", "--reverse", "--start", start, "--frames", 12,
                                    "--seed", 1, "--set", f"sim.seed={world}", calibration=(),
                                    **sensor)

@@ -26,7 +26,7 @@ struct ImmaturePoint {
   std::uint8_t type = 1;     ///< Block size of the selection: 1, 2, 4.
   std::array<float, kPatternSize> colour{};
   std::array<float, kPatternSize> weight{};
-  std::array<float, kPatternSize> bend_u{}, bend_v{};  ///< Second differences of the colours.
+  ColourBlur blur;
   float gxx = 0.0F, gxy = 0.0F, gyy = 0.0F;  ///< Sum of gradient products over the pattern.
   float energy_threshold = 0.0F;             ///< Of the whole pattern.
   float rho_min = 0.0F;                      ///< [1/m]

@@ -30,9 +30,6 @@ T gram_row(const std::array<float, 10>& gram, std::size_t row, const std::array<
 /// Sum of squared gradients below which a pattern says nothing.
 constexpr float kMinGradientEnergy = 2.0F;
 
-/// What colours are blurred by at most: second differences tell of narrow kernels only [px^2].
-constexpr float kMostSpread = 0.5F;
-
 constexpr float kMinDepth = 1e-6F;  ///< Least z_target / z_host of a point in front.
 
 /// Geometric Jacobian at the centre pixel, poses frozen (DSO eq. 13 ff.).
@@ -114,8 +111,10 @@ PatternInput pattern_input(const PatternBrightness& brightness, const Point& poi
           .fy = at.fy.data(),
           .colour = point.colour.data(),
           .weight = point.weight.data(),
-          .bend_u = point.bend_u.data(),
-          .bend_v = point.bend_v.data(),
+          .narrow_u = point.blur.narrow_u.data(),
+          .narrow_v = point.blur.narrow_v.data(),
+          .wide_u = point.blur.wide_u.data(),
+          .wide_v = point.blur.wide_v.data(),
           .gain = brightness.gain,
           .bias = brightness.bias,
           .frozen_gain = brightness.frozen_gain,
@@ -125,7 +124,7 @@ PatternInput pattern_input(const PatternBrightness& brightness, const Point& poi
               static_cast<float>(config.gradient_constant * config.gradient_constant),
           .spread = at.spread,
           .point_spread = static_cast<float>(config.point_spread_px * config.point_spread_px),
-          .most_spread = config.equal_blur ? kMostSpread : 0.0F};
+          .most_spread = config.equal_blur ? kWideBlur : 0.0F};
 }
 
 void store_totals(const std::array<float, 16>& totals, LinearizedResidual* out) {

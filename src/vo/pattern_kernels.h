@@ -90,9 +90,10 @@ struct PatternInput {
   const ImageF* image;
   const std::int32_t* offset;  ///< The projected pattern.
   const float *fx, *fy;
-  const float *colour, *weight;  ///< Of the point,
-  const float *bend_u, *bend_v;  ///< and second differences of its colours.
-  float gain, bias;              ///< Host to target.
+  const float *colour, *weight;      ///< Of the point,
+  const float *narrow_u, *narrow_v;  ///< and what blur adds to its colours.
+  const float *wide_u, *wide_v;
+  float gain, bias;  ///< Host to target.
   float frozen_gain, frozen_host_b;
   float huber, squared_gradient_constant;
   PatternSpread spread;
@@ -100,8 +101,17 @@ struct PatternInput {
   float most_spread;   ///< What is taken of a difference; 0: colours as they are.
 };
 
-/// Colours of pixels k on as the target's image blurs them: convolution with a narrow kernel adds
-/// half its variance times the second derivative.
+/// What blur of this variance adds along an axis: a mixture of kernels, whose variances mix alike.
+template <class F>
+SOVO_LANE_FUNCTION F blur_lanes(const F& variance, const float* narrow, const float* wide) {
+  constexpr float kStep = kWideBlur - kNarrowBlur;
+  const F one = lane_of<F>(1.0F);
+  const F some = min_lane(one, F((1.0F / kNarrowBlur) * variance));
+  const F more = clamp_lane(F((1.0F / kStep) * (variance - kNarrowBlur)), F{}, one);
+  return some * load_lane<F>(narrow) + more * load_lane<F>(wide);
+}
+
+/// Colours of pixels k on as the target's image blurs them.
 template <class F>
 SOVO_LANE_FUNCTION F spread_colours(const PatternInput& in, std::size_t k) {
   const F fx = load_lane<F>(in.fx + k);
@@ -113,8 +123,8 @@ SOVO_LANE_FUNCTION F spread_colours(const PatternInput& in, std::size_t k) {
   const PatternSpread& s = in.spread;
   const F along_u = clamp_lane(F(s.uu * u + s.uv * v - in.point_spread), none, most);
   const F along_v = clamp_lane(F(s.vu * u + s.vv * v - in.point_spread), none, most);
-  return load_lane<F>(in.colour + k) +
-         0.5F * (along_u * load_lane<F>(in.bend_u + k) + along_v * load_lane<F>(in.bend_v + k));
+  return load_lane<F>(in.colour + k) + blur_lanes<F>(along_u, in.narrow_u + k, in.wide_u + k) +
+         blur_lanes<F>(along_v, in.narrow_v + k, in.wide_v + k);
 }
 
 /// Weighted residuals and Gram matrix of (gx, gy, ja, jb), as many pixels at a time as F has lanes.

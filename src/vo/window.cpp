@@ -179,8 +179,7 @@ Point point_of(const ImmaturePoint& immature) {
   p.type = immature.type;
   p.colour = immature.colour;
   p.weight = immature.weight;
-  p.bend_u = immature.bend_u;
-  p.bend_v = immature.bend_v;
+  p.blur = immature.blur;
   return p;
 }
 

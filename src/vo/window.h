@@ -39,8 +39,7 @@ struct Point {
   float u = 0.0F, v = 0.0F;                  ///< In the host's level 0 [px].
   std::array<float, kPatternSize> colour{};  ///< Host grey levels of the pattern.
   std::array<float, kPatternSize> weight{};  ///< Gradient weights of the pattern.
-  /// Second differences of the colours along both axes: what blur adds to them.
-  std::array<float, kPatternSize> bend_u{}, bend_v{};
+  ColourBlur blur;
   std::uint8_t type = 1;            ///< Block size of the selection: 1, 2, 4.
   double rho = 0.0;                 ///< Inverse depth, current estimate [1/m].
   SurfaceSlope slope;               ///< Of what it lies on; (0, 0): not known.

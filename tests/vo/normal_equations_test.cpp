@@ -37,8 +37,12 @@ double plain_colour(const PairGeometry& g, const WindowConfig& config, const Poi
   const Vec2 f = seen - seen.array().floor().matrix();
   const Vec2 variance = f - f.cwiseAbs2() + Vec2::Constant(point_spread);
   const Vec2 more =
-      (to_host.cwiseAbs2() * variance - Vec2::Constant(point_spread)).cwiseMax(0.0).cwiseMin(0.5);
-  return point.colour[i] + 0.5 * (more.x() * point.bend_u[i] + more.y() * point.bend_v[i]);
+      (to_host.cwiseAbs2() * variance - Vec2::Constant(point_spread)).cwiseMax(0.0).cwiseMin(2.0);
+  const auto added = [](double blur, double narrow, double wide) {
+    return std::min(blur / 0.5, 1.0) * narrow + std::max((blur - 0.5) / 1.5, 0.0) * wide;
+  };
+  return point.colour[i] + added(more.x(), point.blur.narrow_u[i], point.blur.wide_u[i]) +
+         added(more.y(), point.blur.narrow_v[i], point.blur.wide_v[i]);
 }
 
 PlainSums plain_sums(const Window& window, const WindowConfig& config, int host, int target,

@@ -223,7 +223,7 @@ LineResiduals line_residuals(const ImageF& image, const SearchPattern& pattern, 
 
 namespace {
 
-/// What blur along an axis adds to a grey level.
+/// What blur along an axis adds to a grey level, as `ColourBlur` has it [grey levels].
 struct AddedBlur {
   float narrow, wide;
 };

@@ -174,6 +174,28 @@ TEST_F(PlaneSearch, PatternThatIsBlindOrOutsideMakesNoPoint) {
   EXPECT_FALSE(make_immature_point(host_, 94.0F, 60.0F, 1, config_, 50.0, &p));
 }
 
+TEST_F(PlaneSearch, BlurAddsItsVariance) {
+  // A kernel adds its variance to a parabola x^2, and along an axis nothing to what is linear
+  // there.
+  constexpr float kVertex = 40.0F;
+  for (int y = 0; y < host_.height(); ++y) {
+    for (int x = 0; x < host_.width(); ++x) {
+      const float from = static_cast<float>(x) - kVertex;
+      host_.at(x, y) = from * from + 3.0F * static_cast<float>(y);
+    }
+  }
+  const ColourBlur blur = point_at(44, 60).blur;
+  for (std::size_t i = 0; i < kPatternSize; ++i) {
+    EXPECT_NEAR(blur.narrow_u[i], 0.5F, 1e-3F);
+    EXPECT_NEAR(blur.narrow_u[i] + blur.wide_u[i], 2.0F, 1e-3F);
+    EXPECT_NEAR(blur.narrow_v[i], 0.0F, 1e-3F);
+    EXPECT_NEAR(blur.wide_v[i], 0.0F, 1e-3F);
+  }
+  // As near to the border as a point may lie, the row beyond the first is read as the first: 3 grey
+  // levels more, of which the outermost place of the wide kernel has three sixty-fourths.
+  EXPECT_NEAR(point_at(4, 4).blur.wide_v[0], 3.0F * 3.0F / 64.0F, 1e-3F);
+}
+
 /// Of the pattern's pixels, the i-th.
 float nth(const std::array<Lane, 2>& lanes, std::size_t i) { return lanes[i / kLanes][i % kLanes]; }
 

@@ -57,6 +57,7 @@ Result<void> check_weights(const DirectConfig& vo) {
       {"keyframe.flow_total", keyframe.flow_total},
       {"keyframe.max_translation_flow", keyframe.max_translation_flow},
       {"keyframe.approach", keyframe.approach},
+      {"keyframe.next_frame_score", keyframe.next_frame_score},
       {"keyframe.brightness", keyframe.brightness},
       {"keyframe.rmse_min_score", keyframe.rmse_min_score},
       {"window.folding_weight", window.folding_weight},

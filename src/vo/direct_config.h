@@ -63,12 +63,14 @@ struct TrackerConfig {
 
 /// When a frame becomes a keyframe: the weighted sum of the flow since the newest one (in units of
 /// 1120 / (width + height)) and the brightness change exceeds 1, or a smaller sum and a residual
-/// twice the first one's. A frame that is blurred waits for a sharp one while there is time.
+/// twice the first one's. A frame that is blurred waits for a sharp one while there is time, and
+/// the very next frame has to have moved more: keyframes are every frame or every other one there.
 struct KeyframeConfig {
   double flow_translation = 0.006;
   double flow_total = 0.012;
   double max_translation_flow = 67.0;
   double approach = 4.3;
+  double next_frame_score = 1.35;
   double brightness = 2.0;
   double rmse_factor = 2.0;
   double rmse_min_score = 0.13;
@@ -89,6 +91,8 @@ struct KeyframeConfig {
     v("approach", approach,
       "weight of the motion along the view, in depths of the points, of which near ones count "
       "more");
+    v("next_frame_score", next_frame_score,
+      "motion that makes the very next frame after a keyframe one; 1: as any other");
     v("brightness", brightness, "weight of the change of log-gain");
     v("rmse_factor", rmse_factor, "a keyframe is made above this x the first residual");
     v("rmse_min_score", rmse_min_score, "weighted sum below which no residual makes a keyframe");

@@ -404,6 +404,7 @@ TrackedHistory DirectOdometry::compare_with_past(const TrackingReference& refere
   }
   past_.sharpest = std::max(kForget * past_.sharpest, tracked.sharpness);
   TrackedHistory out{.first_rmse = past_.first_rmse};
+  out.young = window_.size() < config_.keyframe.max_keyframes;
   out.blurred = tracked.sharpness < config_.keyframe.blurred_sharpness * past_.sharpest;
   if (const auto last_stamp_ns = past_.motion.last_stamp_ns()) {
     const double since_last = seconds_between(*last_stamp_ns, frame.stamp_ns);

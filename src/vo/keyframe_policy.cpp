@@ -9,6 +9,8 @@ namespace {
 
 constexpr int kManyGood = 14;  // good residuals on record of a long-seen point
 constexpr int kFewLeft = 3;
+constexpr double kNextFrame = 1.5;  // of the time between two frames
+constexpr double kFitsWell = 0.85;  // share of what is tracked that agrees
 
 /// Sum over the other keyframes of 1 / distance, times the root of the distance to the newest;
 /// distances in mean depths.
@@ -56,12 +58,18 @@ bool wants_keyframe(const KeyframeConfig& config, const CameraModel& camera,
   const double next_score = moved * (1.0 + 1.0 / history.frames);
   const bool fits = tracked.inlier_ratio > config.blurred_min_inlier_ratio;
   if (history.blurred && fits && next_score < config.blurred_max_score) return false;
-  const double score = moved + config.brightness * std::abs(std::log(transfer.gain));
+  const double brightness = config.brightness * std::abs(std::log(transfer.gain));
+  const double score = moved + brightness;
   // The residual of a camera at rest is noise, and twice of it nothing that a keyframe would mend:
   // without parallax the window's scale would be left to that noise.
   const bool fits_badly =
       tracked.rmse > config.rmse_factor * history.first_rmse && score > config.rmse_min_score;
-  return score > 1.0 || fits_badly;
+  // Between every frame and every other one a little more motion would double the keyframes, and
+  // one that is twice as far away is as good, where the map is whole and what is tracked fits.
+  const bool may_wait =
+      history.frames < kNextFrame && !history.young && tracked.inlier_ratio > kFitsWell;
+  const double wanted = may_wait ? std::max(1.0, config.next_frame_score) : 1.0;
+  return moved / wanted + brightness > 1.0 || fits_badly;
 }
 
 void mark_leaving_keyframes(const KeyframeConfig& config, Window* window) {

@@ -22,6 +22,7 @@ struct TrackedHistory {
   double first_rmse = 0.0;  ///< Of the first frame tracked against this reference.
   bool blurred = false;     ///< Those shortly before were sharper.
   double frames = 1.0;      ///< Time since the reference over that since the last frame.
+  bool young = false;       ///< The window has room for more keyframes.
 };
 
 /// Whether a tracked frame should become a keyframe. `motion`: of the reference's points, flows

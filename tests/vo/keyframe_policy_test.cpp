@@ -16,13 +16,14 @@ class KeyframeDecision : public ::testing::Test {
 
   /// Flow of the whole image without rotation [px], residual over that of the first frame.
   bool wanted(double flow_px, double rmse_ratio, double log_gain = 0.0, double approach = 0.0,
-              bool blurred = false, double frames = 1.0, double inlier_ratio = 1.0) const {
+              bool blurred = false, double frames = 2.0, double inlier_ratio = 1.0,
+              bool young = false) const {
     TrackingResult tracked;
     tracked.rmse = rmse_ratio;
     tracked.inlier_ratio = inlier_ratio;
     tracked.affine.a = log_gain;
     return wants_keyframe(KeyframeConfig(), camera_, TrackingReference(), tracked,
-                          {flow_px, flow_px, approach}, 0.0, {1.0, blurred, frames});
+                          {flow_px, flow_px, approach}, 0.0, {1.0, blurred, frames, young});
   }
 
   CameraModel camera_;
@@ -59,7 +60,7 @@ TEST_F(KeyframeDecision, ABlurredFrameWaitsForASharpOneWhileThereIsTime) {
   EXPECT_FALSE(blurred(57.0, 1.0, 5.0)) << "the next one moves a fifth more";
   EXPECT_FALSE(blurred(60.0, 1.0, 5.0));
   EXPECT_TRUE(blurred(61.0, 1.0, 5.0));
-  EXPECT_TRUE(blurred(57.0, 1.0, 1.0)) << "the next one will be twice as far";
+  EXPECT_TRUE(blurred(77.0, 1.0, 1.0)) << "the next one will be twice as far";
   ASSERT_TRUE(wanted(8.0, 2.1));
   EXPECT_FALSE(blurred(8.0, 2.1, 5.0)) << "blur fits badly";
   ASSERT_TRUE(wanted(20.0, 1.0, -0.51));
@@ -67,6 +68,21 @@ TEST_F(KeyframeDecision, ABlurredFrameWaitsForASharpOneWhileThereIsTime) {
   EXPECT_FALSE(wanted(8.0, 2.1, 0.0, 0.0, true, 5.0, 0.8));
   EXPECT_TRUE(wanted(8.0, 2.1, 0.0, 0.0, true, 5.0, 0.7)) << "the next one may not fit at all";
   EXPECT_FALSE(wanted(8.0, 1.9, 0.0, 0.0, true, 5.0, 0.7));
+}
+
+TEST_F(KeyframeDecision, TheVeryNextFrameHasToHaveMovedMore) {
+  const auto after = [this](double frames, double flow_px, double log_gain = 0.0) {
+    return wanted(flow_px, 1.0, log_gain, 0.0, false, frames);
+  };
+  EXPECT_FALSE(after(1.0, 74.0));
+  EXPECT_TRUE(after(1.0, 76.0));
+  EXPECT_FALSE(after(1.2, 57.0)) << "frames that come unevenly";
+  EXPECT_TRUE(after(1.8, 57.0));
+  EXPECT_TRUE(after(1.0, 0.0, 0.51)) << "another light does not wait";
+  EXPECT_TRUE(wanted(8.0, 2.1, 0.0, 0.0, false, 1.0)) << "nor does a bad fit";
+  EXPECT_FALSE(wanted(57.0, 1.0, 0.0, 0.0, false, 1.0, 0.9));
+  EXPECT_TRUE(wanted(57.0, 1.0, 0.0, 0.0, false, 1.0, 0.8)) << "the one after may not fit";
+  EXPECT_TRUE(wanted(57.0, 1.0, 0.0, 0.0, false, 1.0, 1.0, true)) << "a map that is growing";
 }
 
 /// A window without images, whose points are a metre away.

@@ -63,8 +63,9 @@ struct TrackerConfig {
 
 /// When a frame becomes a keyframe: the weighted sum of the flow since the newest one (in units of
 /// 1120 / (width + height)) and the brightness change exceeds 1, or a smaller sum and a residual
-/// twice the first one's. A frame that is blurred waits for a sharp one while there is time, and
-/// the very next frame has to have moved more: keyframes are every frame or every other one there.
+/// twice the first one's. A frame that is blurred waits for a sharp one while there is time. The
+/// very next frame after a keyframe has to have moved more where the window is full and what is
+/// tracked fits.
 struct KeyframeConfig {
   double flow_translation = 0.006;
   double flow_total = 0.012;

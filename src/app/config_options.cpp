@@ -72,6 +72,13 @@ Result<void> check_weights(const DirectConfig& vo) {
   return {};
 }
 
+/// With what the scale filter could expect no drift.
+Result<void> check_filter(const ScaleFilterConfig& filter) {
+  if (!(filter.drift_sigma >= 0.0)) return Error{"filter.drift_sigma must not be negative"};
+  if (!(filter.drift_distance > 0.0)) return Error{"filter.drift_distance must be positive"};
+  return {};
+}
+
 /// What would call stereo matching and send it away at once.
 Result<void> check_assist(const StereoAssistConfig& assist) {
   if (!(assist.few_points >= 0.0 && assist.few_points <= assist.enough_points)) {
@@ -322,6 +329,7 @@ Result<void> check_config(const AppConfig& config) {
   if (auto window = check_window(config.odometry.vo); !window) return window;
   if (auto along = check_co_moving(config.odometry.vo.co_moving); !along) return along;
   if (auto assist = check_assist(config.odometry.assist); !assist) return assist;
+  if (auto filter = check_filter(config.odometry.filter); !filter) return filter;
   if (auto light = check_local_contrast(config.odometry.local_contrast); !light) return light;
   if (auto loops = check_loops(config); !loops) return loops;
   if (!(config.node.idle_exit_s >= 0.0)) return Error{"node.idle_exit_s must not be negative"};

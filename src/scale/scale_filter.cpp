@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace sovo {
 
@@ -45,6 +46,7 @@ void ScaleFilter::lock_initial(double sigma, std::int64_t stamp_ns) {
   candidate_.reset();
   variance_ = square(std::max(sigma, config_.initial_sigma));
   path_variance_ = variance_;
+  forget_drift();
   accepted_stamp_ns_ = stamp_ns;
 }
 
@@ -55,6 +57,7 @@ void ScaleFilter::widen(double log_scale) {
 
 ScaleUpdate ScaleFilter::update(const ScaleMeasurement& m) {
   if (locked_) {  // the error has walked since the last keyframe, seen or not
+    drift_on(distance(m));
     variance_ += walked(m);
     path_variance_ += walked(m);
   }
@@ -109,7 +112,8 @@ ScaleUpdate ScaleFilter::update_tracking(const ScaleMeasurement& m) {
     disagree();
     return update;
   }
-  update.innovation = m.estimate.log_scale - m.pending_log_scale;
+  update.expected = expected_;
+  update.innovation = m.estimate.log_scale - m.pending_log_scale - expected_;
   const double innovation_variance = variance_ + measured_variance(m);
   update.nis = square(update.innovation) / innovation_variance;
   learn(update.innovation, innovation_variance);
@@ -125,7 +129,8 @@ ScaleUpdate ScaleFilter::update_tracking(const ScaleMeasurement& m) {
 ScaleUpdate ScaleFilter::update_cold(const ScaleMeasurement& m) {
   ScaleUpdate update;
   update.verdict = m.estimate.verdict;
-  update.innovation = m.estimate.log_scale - m.pending_log_scale;
+  update.expected = expected_;
+  update.innovation = m.estimate.log_scale - m.pending_log_scale - expected_;
   const double variance = measured_variance(m);
   if (update.verdict == ScaleVerdict::kAccepted) {
     if (!locked_) return lock_on(m, update, variance);
@@ -152,9 +157,10 @@ ScaleUpdate ScaleFilter::correct(const ScaleMeasurement& m, ScaleUpdate update) 
   const double c = config_.max_correlation * std::clamp(m.shared_points, 0.0, 1.0);
   update.apply = true;
   update.gain = K;
-  update.log_scale_correction = K * update.innovation;
+  update.log_scale_correction = update.expected + K * update.innovation;
   update.verdict = ScaleVerdict::kAccepted;
-  confirmed_ = true;
+  if (!std::exchange(confirmed_, true)) forget_drift();  // how far a start was off is none
+  learn_drift(K, R, update.innovation);
   variance_ = square(1.0 - K) * variance_ + square(K) * R * correlation_growth(c * (1.0 - K));
   // Spectrum of the error at frequency zero: noise passes entire, the walk as it lags.
   path_variance_ = R * correlation_growth(c) + square((1.0 - K) / K) * walked(m);
@@ -172,7 +178,7 @@ ScaleUpdate ScaleFilter::lock_on(const ScaleMeasurement& m, ScaleUpdate update, 
   path_variance_ = variance;
   update.apply = true;
   update.gain = 1.0;
-  update.log_scale_correction = update.innovation;
+  update.log_scale_correction = update.expected + update.innovation;
   update.verdict = ScaleVerdict::kAccepted;
   return update;
 }
@@ -238,8 +244,37 @@ bool ScaleFilter::within_gate(const ScaleUpdate& update) const {
   return update.nis <= square(config_.gate_sigmas);
 }
 
-double ScaleFilter::walked(const ScaleMeasurement& m) const {
-  return process_noise_ * std::max(m.distance, config_.min_distance);
+double ScaleFilter::walked(const ScaleMeasurement& m) const { return process_noise_ * distance(m); }
+
+double ScaleFilter::distance(const ScaleMeasurement& m) const {
+  return std::max(m.distance, config_.min_distance);
+}
+
+/// What the drift makes of the way to the next keyframe, and how sure of that one is. While scales
+/// are not seen something else may hold them, so what is expected does not add up.
+void ScaleFilter::drift_on(double distance) {
+  expected_ = std::clamp(drift_ * distance, -kLargestDrift, kLargestDrift);
+  variance_ += distance * (2.0 * drift_covariance_ + distance * drift_variance_);
+  const double kept = std::exp(-distance / config_.drift_distance);
+  drift_ *= kept;
+  drift_covariance_ = kept * (drift_covariance_ + distance * drift_variance_);
+  drift_variance_ += (1.0 - kept * kept) * (square(config_.drift_sigma) - drift_variance_);
+}
+
+/// The second row of the gain, before `variance_` is corrected.
+void ScaleFilter::learn_drift(double gain, double measured, double innovation) {
+  const double drift_gain = drift_covariance_ / (variance_ + measured);
+  drift_ += drift_gain * innovation;
+  drift_variance_ -= drift_gain * drift_covariance_;
+  drift_covariance_ *= 1.0 - gain;
+  expected_ = 0.0;
+}
+
+void ScaleFilter::forget_drift() {
+  drift_ = 0.0;
+  drift_covariance_ = 0.0;
+  drift_variance_ = square(config_.drift_sigma);
+  expected_ = 0.0;
 }
 
 double ScaleFilter::sigma() const { return std::sqrt(variance_ + doubt_); }

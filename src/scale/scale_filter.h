@@ -14,6 +14,10 @@ struct ScaleFilterConfig {
   double process_noise = 1e-4;
   double min_process_noise = 1e-5;  ///< Bounds of what is learned.
   double max_process_noise = 3e-3;
+  /// A map may shrink or grow steadily. Standard deviation of that drift, as log-scale over a
+  /// distance of one median depth, and the distance after which it has become another one.
+  double drift_sigma = 0.006;    ///< 0: no drift is expected.
+  double drift_distance = 10.0;  ///< [median depths]
   /// Variance of a measurement over the one that its optimizer claims: keyframes share points,
   /// occlusions and reflections, which no residual shows.
   double measurement_factor = 4.0;
@@ -34,6 +38,9 @@ struct ScaleFilterConfig {
       "variance of log-scale gained over a distance of one median depth");
     v("min_process_noise", min_process_noise, "least process noise that is learned");
     v("max_process_noise", max_process_noise, "largest process noise that is learned");
+    v("drift_sigma", drift_sigma,
+      "standard deviation of a steady drift of log-scale over one median depth; 0: none");
+    v("drift_distance", drift_distance, "distance after which a drift is another [median depths]");
     v("min_distance", min_distance, "distance counted at least, a keyframe [median depths]");
     v("measurement_factor", measurement_factor,
       "variance of a measurement over the one that the optimizer claims");
@@ -62,22 +69,24 @@ struct ScaleMeasurement {
 
 /// What the filter makes of a measurement.
 struct ScaleUpdate {
-  bool apply = false;                                  ///< Whether a correction is to be applied.
-  double log_scale_correction = 0.0;                   ///< To be applied on top of what is pending.
-  double gain = 0.0;                                   ///< K: correction = K * innovation.
-  double innovation = 0.0;                             ///< Measured log-scale less what is pending.
-  double nis = 0.0;                                    ///< Innovation squared over its variance.
+  bool apply = false;                 ///< Whether a correction is to be applied.
+  double log_scale_correction = 0.0;  ///< To be applied on top of what is pending.
+  double expected = 0.0;              ///< Log-scale error by the drift so far.
+  double gain = 0.0;                  ///< K: correction = expected + K innovation.
+  double innovation = 0.0;            ///< Measured, less what is pending, expected.
+  double nis = 0.0;                   ///< Innovation squared over its variance.
   ScaleVerdict verdict = ScaleVerdict::kTooFewPoints;  ///< The estimate's, or kInnovation.
 };
 
 /// Kalman filter of the log-scale error of a monocular window: P += q d, K = P / (P + R). Each
-/// correction is applied at once, so that the expected error is always zero.
+/// correction is applied at once, so that right after it the expected error is zero.
 ///
-/// The gain fights lag: with constant drift e a keyframe the error stays at e (1 - K) / K. Before
-/// the first lock nothing is applied: it takes an accepted cold start, or two ambiguous ones that
-/// agree. Keyframes that cannot see the scale (too few points or disparities, no right image)
-/// count neither for nor against it, unless it is for long this scale that puts the points outside
-/// the right image: then it is searched anew.
+/// With a constant drift e a keyframe the error would stay at e (1 - K) / K, so the drift is a
+/// second state (Gauss-Markov), which the innovations move; what it makes of the way to the next
+/// keyframe is corrected entirely. Before the first lock nothing is applied: it takes an accepted
+/// cold start, or two ambiguous ones that agree. Keyframes that cannot see the scale (too few
+/// points or disparities, no right image) count neither for nor against it, unless it is for long
+/// this scale that puts the points outside the right image: then it is searched anew.
 class ScaleFilter {
  public:
   explicit ScaleFilter(const ScaleFilterConfig& config);
@@ -137,12 +146,20 @@ class ScaleFilter {
   double measured_variance(const ScaleMeasurement& m) const;
   bool within_gate(const ScaleUpdate& update) const;
   double walked(const ScaleMeasurement& m) const;
+  double distance(const ScaleMeasurement& m) const;
+  void drift_on(double distance);
+  void learn_drift(double gain, double measured, double innovation);
+  void forget_drift();
 
   ScaleFilterConfig config_;
   bool locked_ = false;
   bool confirmed_ = false;  ///< A measurement has agreed with the lock, or given it.
   bool searching_ = false;  ///< Locked, but doubted: cold starts are asked for.
   double variance_ = 0.0;   ///< P
+  double drift_ = 0.0;      ///< Of log-scale, over one median depth.
+  double drift_variance_ = 0.0;
+  double drift_covariance_ = 0.0;  ///< Of the drift and the log-scale error.
+  double expected_ = 0.0;  ///< Log-scale error that the drift has made since the correction.
   double path_variance_ = 0.0;
   double process_noise_ = 0.0;
   double measurement_factor_ = 1.0;

@@ -48,6 +48,7 @@ class Configuration(CommandTest):
                            "camera.start=-1", "no.such.key=1", "mode",
                            "vo.keyframe.approach=-1", "vo.window.static_weight=nan",
                            "vo.selection.border=3", "vo.selection.least_offset=8",
+                           "filter.drift_sigma=-0.1", "filter.drift_distance=0",
                            "assist.few_points=0.9", "assist.good_keyframes=0",
                            "vo.weak_texture.least_share=0", "vo.weak_texture.to_gradient=20",
                            "vo.co_moving.cell=3", "vo.co_moving.min_displacement=0",

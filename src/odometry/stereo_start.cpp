@@ -44,9 +44,11 @@ StereoStart stereo_start(const std::vector<SelectedPixel>& pixels,
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     const DepthProposal depth = proposal_of(matches[i]);
     start.points[i] = {pixels[i], depth};
-    start.quality.in_view += matches[i].state != MatchState::kOutOfView ? 1 : 0;
-    if (depth.sigma <= 0.0F) continue;
-    ++start.quality.good;
+    const bool good = depth.sigma > 0.0F;
+    const bool tells = !pixels[i].sparse;
+    if (tells && matches[i].state != MatchState::kOutOfView) ++start.quality.in_view;
+    if (tells && good) ++start.quality.good;
+    if (!good) continue;
     scale_information += std::pow(depth.rho / depth.sigma, 2);
   }
   start.quality.weak_texture = !pixels.empty() && pixels.front().threshold_share < 1.0F;

@@ -91,10 +91,6 @@ DirectOdometry::DirectOdometry(const DirectConfig& config, const CameraModel& ca
       adjuster_(config.window, pool),
       tracker_(config.tracker) {}
 
-std::vector<SelectedPixel> DirectOdometry::select_pixels(const MonoFrame& frame, int wanted) {
-  return select_usable(*frame.pyramid, wanted);
-}
-
 /// Pixels that neither the mask leaves out nor what moves along with the camera.
 std::vector<SelectedPixel> DirectOdometry::select_usable(const ImagePyramid& pyramid, int wanted) {
   const ImageU8 narrower = co_moving_.any() ? co_moving_.mask(mask_) : ImageU8();
@@ -120,7 +116,9 @@ void DirectOdometry::begin(const MonoFrame& frame, const SE3& T_world_camera,
   next_id_ = 0;
   Keyframe& k =
       window_.insert(new_keyframe(next_id_++, frame, T_world_camera, Affine(), config_.window));
+  before_sparse_.reset();
   for (const StartPoint& s : points) {
+    if (s.pixel.sparse && !before_sparse_) before_sparse_ = {k.points.size(), k.immature.size()};
     ImmaturePoint p;
     if (!make_immature_point(k.image(), s.pixel.x, s.pixel.y, s.pixel.type, config_.points,
                              config_.window.gradient_constant, &p)) {
@@ -166,7 +164,10 @@ MapResult DirectOdometry::map(const TrackedFrame& tracked, const KeyframeStereo&
     co_moving_.add(view->cells);
     leave_out_co_moving();
     publish_reference(with_matched(active_points(window_), window_), tracked.tracking.rmse);
+  } else if (before_sparse_) {
+    drop_sparse_points();
   }
+  before_sparse_.reset();
   if (tracked.wants_keyframe && !stale) {
     return make_keyframe(found, T_world_camera, stereo, timer);
   }

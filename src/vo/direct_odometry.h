@@ -90,6 +90,8 @@ class DirectOdometry final : public MonocularBackend {
   void observe_light();
   std::vector<SelectedPixel> select_lasting_pixels();
   std::vector<SelectedPixel> select_usable(const ImagePyramid& pyramid, int wanted);
+  /// Takes the sparse pixels' points out of a map that has only its first keyframe.
+  void drop_sparse_points();
   void find_co_moving(const TrackedFrame& tracked, const SE3& T_world_camera);
   void leave_out_co_moving();
   void begin_residuals_in_newest();
@@ -152,11 +154,22 @@ class DirectOdometry final : public MonocularBackend {
                    TrackingResult* whole);
   MotionEvidence evidence_of(const TrackingReference& reference, const MonoFrame& frame,
                              const TrackingResult& tracked);
+  /// A motion of a map's second frame, of which none is known, where the world contradicts that the
+  /// camera stands, or hardly moves: that may be all that fits, or more than what does (`near`),
+  /// where the vehicle's own body has most of the points. As above, told in `views`.
+  std::optional<TrackingResult> start_beside_body(const TrackingReference& reference,
+                                                  const MonoFrame& frame,
+                                                  const TrackingResult& near,
+                                                  std::shared_ptr<const FrameViews>* views);
+  /// Squares that a motion should have taken away, and which stayed.
+  ChosenCells staying_of(const TrackingReference& reference, const MonoFrame& frame,
+                         const TrackingResult& tracked);
   /// Aligns anew without what stays in its place, and tells in `co_moving` what should have moved.
-  /// `before` is told that its motion is confirmed where that is found again.
+  /// `before` is told that its motion is confirmed where that is found again; `starts`: it tells
+  /// nothing against another one.
   std::optional<TrackingResult> align_rest(const TrackingReference& reference,
-                                           const MonoFrame& frame, TrackingResult* before,
-                                           ChosenCells* co_moving);
+                                           const MonoFrame& frame, bool starts,
+                                           TrackingResult* before, ChosenCells* co_moving);
   /// Compares a tracked frame with those before it, and notes what the next one is compared with.
   TrackedHistory compare_with_past(const TrackingReference& reference, const MonoFrame& frame,
                                    const TrackingResult& tracked);
@@ -179,6 +192,8 @@ class DirectOdometry final : public MonocularBackend {
   PointActivator activator_;
   BundleAdjuster adjuster_;
   std::uint32_t next_id_ = 0;
+  /// Active and immature points that are not of sparse pixels, until the map's second frame.
+  std::optional<std::pair<std::size_t, std::size_t>> before_sparse_;
   std::optional<KeyframeSnapshot> snapshot_;
   MapHistory history_;
   BrightnessTransfer right_brightness_;  ///< Of the newest keyframe with a right image.

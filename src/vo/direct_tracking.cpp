@@ -265,7 +265,7 @@ TrackingResult DirectOdometry::track_standing(const TrackingReference& reference
 }
 
 std::optional<TrackingResult> DirectOdometry::align_rest(const TrackingReference& reference,
-                                                         const MonoFrame& frame,
+                                                         const MonoFrame& frame, bool starts,
                                                          TrackingResult* before,
                                                          ChosenCells* co_moving) {
   const ImageCells cells(config_.co_moving.cell, camera_.width, camera_.height);
@@ -283,24 +283,30 @@ std::optional<TrackingResult> DirectOdometry::align_rest(const TrackingReference
   const SE3& T_before = before->T_current_reference;
   const auto fit = tracker_.fit(rest, image, T_before, transfer(before->affine));
   const bool moves = before->motion_denied;
-  if (!moves && fit.misfits < kMisfits) return {};
+  const bool contradicted = fit.misfits >= kMisfits;
+  if (!moves && !contradicted && !starts) return {};
   const auto track = [&](const TrackingReference& against, std::span<const SE3> motions) {
     return tracker_.track(against, *frame.pyramid, frame.exposure_s, before->affine, motions, {});
   };
-  const TrackingResult found = track(
+  TrackingResult found = track(
       rest, tracker_.rank(rest, *frame.pyramid, frame.exposure_s, before->affine,
                           unknown_motions(T_before, rest.mean_rho, kUnknownShares), kMotionsKept));
+  if (starts) found = search_ahead(rest, frame, found);
   if (!found.good) return {};
   const SE3& T_found = found.T_current_reference;
-  if (moves) {
-    before->motion_denied = !is_nearly(T_found, T_before, rest.mean_rho);
-    const auto now = tracker_.fit(rest, image, T_found, transfer(found.affine));
-    if (found.inlier_ratio < kFitsBetter || now.energy > kLessEnergy * fit.energy) return {};
-  } else if (found.inlier_ratio < std::max(kFits, 1.0 - kLess * fit.misfits)) {
-    return {};
-  }
-  *co_moving = co_moving_cells(config_.co_moving, cells, reference, T_found, staying);
-  if (!moves && std::ranges::count(*co_moving, 0) == std::ssize(*co_moving)) return {};
+  const auto now = tracker_.fit(rest, image, T_found, transfer(found.affine));
+  const bool better = found.inlier_ratio >= kFitsBetter && now.energy <= kLessEnergy * fit.energy;
+  const bool agrees =
+      contradicted && found.inlier_ratio >= std::max(kFits, 1.0 - kLess * fit.misfits);
+  const bool confirmed = moves && is_nearly(T_found, T_before, rest.mean_rho);
+  if (moves) before->motion_denied = !confirmed;
+  const bool taken = moves ? better : agrees || (starts && better);
+  // A right motion of a map's second frame shows at once what moves along.
+  const bool shows = !taken && confirmed && place_unknown_ && found.inlier_ratio >= kFitsBetter;
+  if (!taken && !shows) return {};
+  const ChosenCells beyond_doubt = shows ? staying_of(reference, frame, found) : staying;
+  *co_moving = co_moving_cells(config_.co_moving, cells, reference, T_found, beyond_doubt);
+  if ((!moves || shows) && std::ranges::count(*co_moving, 1) == 0) return {};
   // What stays in its place since it is far tells of the motion, too.
   const TrackingResult out = track(without(reference, cells, *co_moving), std::array{T_found});
   const bool reached = !known_motion_ || is_reachable(*known_motion_, out.T_current_reference);
@@ -327,16 +333,39 @@ MotionEvidence DirectOdometry::evidence_of(const TrackingReference& reference,
                                               tracked.affine, frame.exposure_s));
 }
 
+std::optional<TrackingResult> DirectOdometry::start_beside_body(
+    const TrackingReference& reference, const MonoFrame& frame, const TrackingResult& near,
+    std::shared_ptr<const FrameViews>* views) {
+  if (!config_.co_moving.enable || !place_unknown_) return {};
+  TrackingResult standing;
+  standing.affine = past_.affine;
+  if (near.good) standing = near;
+  if (flow_of(standing.T_current_reference, reference) > kNearRest) return {};
+  auto view = std::make_shared<CoMovingView>();
+  const auto moved = align_rest(reference, frame, true, &standing, &view->cells);
+  if (moved) *views = std::move(view);
+  return moved;
+}
+
+ChosenCells DirectOdometry::staying_of(const TrackingReference& reference, const MonoFrame& frame,
+                                       const TrackingResult& tracked) {
+  evidence_of(reference, frame, tracked);
+  return motion_check_.staying();
+}
+
 TrackingResult DirectOdometry::align_whole_or_rest(const TrackingReference& reference,
                                                    const MonoFrame& frame,
                                                    std::shared_ptr<const FrameViews>* views) {
   const TrackingResult near = found_or_at_rest(reference, frame, align(reference, frame));
+  if (const auto moved = start_beside_body(reference, frame, near, views)) return *moved;
   const TrackingResult found = whole_or_rest(reference, frame, near, views);
   if (!place_unknown_ || !found.good || *views != nullptr) return found;
   const TrackingResult better = search_ahead(reference, frame, found);
   const bool same =
       is_nearly(better.T_current_reference, found.T_current_reference, reference.mean_rho);
-  return same ? found : whole_or_rest(reference, frame, better, views);
+  if (same) return found;
+  if (const auto moved = start_beside_body(reference, frame, better, views)) return *moved;
+  return whole_or_rest(reference, frame, better, views);
 }
 
 TrackingResult DirectOdometry::whole_or_rest(const TrackingReference& reference,
@@ -354,7 +383,7 @@ TrackingResult DirectOdometry::whole_or_rest(const TrackingReference& reference,
     return whole;
   }
   auto view = std::make_shared<CoMovingView>();
-  if (const auto moved = align_rest(reference, frame, &whole, &view->cells)) {
+  if (const auto moved = align_rest(reference, frame, false, &whole, &view->cells)) {
     *views = std::move(view);
     return *moved;
   }

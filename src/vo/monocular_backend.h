@@ -157,7 +157,8 @@ class MonocularBackend {
   /// Points that a map should have.
   virtual int wanted_points() const = 0;
 
-  /// Chooses the pixels that a map would begin with.
+  /// Chooses the pixels that a map would begin with; those that are `sparse` are the last ones, and
+  /// more than were wanted.
   virtual std::vector<SelectedPixel> select_pixels(const MonoFrame& frame, int wanted) = 0;
 
   /// Begins a map with `frame` as first keyframe. Points without a depth get theirs from later

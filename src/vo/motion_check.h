@@ -40,6 +40,8 @@ class MotionCheck {
   /// more. `transfer`: of brightness, reference to image.
   MotionEvidence of(const TrackingReference& reference, const ImageF& image,
                     const SE3& T_current_reference, const BrightnessTransfer& transfer);
+  /// Squares that agreed much better where they were than where the last motion took them.
+  const ChosenCells& staying() const { return staying_; }
 
  private:
   struct Sums {

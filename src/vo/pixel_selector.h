@@ -54,6 +54,7 @@ struct SelectedPixel {
   float gradient_squared = 0.F;  ///< At level 0 [(grey levels / px)^2].
   /// Part of `threshold_offset` that was asked of it: below 1 where the image has little texture.
   float threshold_share = 1.0F;
+  bool sparse = false;  ///< Chosen in addition, from where there are hardly any others.
 };
 
 /// Chooses pixels with enough gradient, spread over the whole image (Engel, Koltun, Cremers,

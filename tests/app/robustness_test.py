@@ -61,6 +61,15 @@ class Robustness(SimTest):
                                    f"sim.seed={world}", calibration=())
             self.expect_whole(truth, live, 0.03)
 
+    def test_the_vehicles_own_body_before_sand_that_is_passed_already_at_the_start(self):
+        # Standing still fits nearly all of the image, and most of its texture.
+        for body, world, start, haze in (("bonnet", 21, 70, 0), ("arms", 23, 200, 0.4),
+                                         ("bonnet", 22, 200, 0.4)):
+            truth, live = self.fly("sand", "--start", start, "--frames", 60, "--set",
+                                   f"sim.own_body={body}", "--set", f"sim.seed={world}",
+                                   veil=haze)
+            self.expect_whole(truth, live, 0.05)
+
     def test_darkened_corners_over_bare_sand(self):
         # They stay, and are stronger than anything in the sand.
         dark = {"vignette": 0.4, "calibrated": "false"}

@@ -22,12 +22,17 @@ DirectConfig body_config() {
 /// A vehicle that sees its own body before a room.
 class Vehicle {
  public:
-  explicit Vehicle(int body_edge = kBodyEdge)
-      : body_edge_(body_edge), pool_(1), vo_(body_config(), small_camera(), ImageU8(), 0, &pool_) {
+  /// `contrast`: of the world, as a share of what it mostly is.
+  explicit Vehicle(int body_edge = kBodyEdge, float contrast = 1.0F)
+      : body_edge_(body_edge),
+        contrast_(contrast),
+        pool_(1),
+        vo_(body_config(), small_camera(), ImageU8(), 0, &pool_) {
     const MonoFrame first = seen_from(SE3(), 0);
     std::vector<StartPoint> points;
     for (const SelectedPixel& pixel : vo_.select_pixels(first, 700)) {
       points.push_back({pixel, depth_of(pixel, SE3())});
+      if (pixel.sparse) sparse_.push_back(pixel);
     }
     vo_.begin(first, SE3(), points, nullptr);
   }
@@ -48,12 +53,26 @@ class Vehicle {
   }
 
   DirectOdometry& odometry() { return vo_; }
+  /// How many of the sparse pixels that the map began with have a point in the first keyframe.
+  std::size_t sparse_points() {
+    const Keyframe& first = vo_.window()[0];
+    return static_cast<std::size_t>(std::ranges::count_if(sparse_, [&](const SelectedPixel& s) {
+      const auto is_there = [&](const auto& p) {
+        return p.u == static_cast<float>(s.x) && p.v == static_cast<float>(s.y);
+      };
+      return std::ranges::any_of(first.points, is_there) ||
+             std::ranges::any_of(first.immature, is_there);
+    }));
+  }
   MonoFrame seen_from(const SE3& T_world_camera, int index) const {
     MonoFrame frame = frame_at(scene_, T_world_camera, index);
     ImageF image = frame.pyramid->level(0);
     for (int y = 0; y < image.height(); ++y) {
       for (int x = 0; x < image.width(); ++x) {
-        if (y < body_edge_) continue;
+        if (y < body_edge_) {
+          image.at(x, y) = 128.0F + contrast_ * (image.at(x, y) - 128.0F);
+          continue;
+        }
         image.at(x, y) =
             static_cast<float>(110.0 + 40.0 * std::sin(0.5 * x) * std::cos(0.45 * y + 0.1 * x));
       }
@@ -73,6 +92,8 @@ class Vehicle {
 
   SyntheticScene scene_{3};
   int body_edge_;
+  float contrast_;
+  std::vector<SelectedPixel> sparse_;
   WorkerPool pool_;
   DirectOdometry vo_;
   SE3 pose_;
@@ -159,6 +180,45 @@ TEST(OwnBodyInView, AloneDoesNotMakeACameraRest) {
       }
     }
   }
+}
+
+/// Of a weakly textured world little is seen but the body, and standing still fits most points.
+TEST(OwnBodyInView, ItIsLeftOutFromAMapsSecondFrameOnWhereTheWorldIsWeak) {
+  for (const float contrast : {0.05F, 0.08F}) {
+    for (const int speed : {2, 3}) {
+      Vehicle vehicle(100, contrast);
+      EXPECT_GT(vehicle.sparse_points(), 100U);
+      const auto points = [&] { return vehicle.odometry().window()[0].points.size(); };
+      const std::size_t before = points();
+      for (int i = 1; i <= 8; ++i) {
+        const SE3 truth = drive(speed * i);
+        const TrackedFrame tracked = vehicle.track(truth);
+        ASSERT_TRUE(tracked.tracking.good) << contrast << ' ' << speed << ' ' << i;
+        EXPECT_EQ(tracked.views != nullptr, i == 1) << contrast << ' ' << speed << ' ' << i;
+        const double off = (tracked.T_world_camera.translation() - truth.translation()).norm();
+        EXPECT_LT(off, 0.04) << contrast << ' ' << speed << ' ' << i;
+        vehicle.map(tracked);
+        if (i == 1) {
+          EXPECT_LT(points(), before) << "those of the body are no more";
+          EXPECT_GT(vehicle.sparse_points(), 100U);
+        }
+      }
+    }
+  }
+}
+
+TEST(OwnBodyInView, AMapDoesWithoutSparsePointsWhereNothingSpeaksAgainstStanding) {
+  Vehicle vehicle(100, 0.05F);
+  ASSERT_GT(vehicle.sparse_points(), 100U);
+  const Keyframe& first = vehicle.odometry().window()[0];
+  const std::size_t others = first.points.size() + first.immature.size() - vehicle.sparse_points();
+  const TrackedFrame tracked = vehicle.track(SE3());
+  ASSERT_TRUE(tracked.tracking.good);
+  EXPECT_EQ(tracked.views, nullptr);
+  vehicle.map(tracked);
+  EXPECT_EQ(vehicle.sparse_points(), 0U);
+  EXPECT_EQ(first.points.size() + first.immature.size(), others);
+  EXPECT_EQ(vehicle.odometry().tracking_reference()->levels[0].size(), first.points.size());
 }
 
 TEST(OwnBodyInView, WhatItHidesIsOutOfViewThere) {

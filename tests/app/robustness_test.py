@@ -69,6 +69,11 @@ class Robustness(SimTest):
                                    f"sim.own_body={body}", "--set", f"sim.seed={world}",
                                    veil=haze)
             self.expect_whole(truth, live, 0.05)
+        # The true motion fits, with the body as so many outliers, or nothing does.
+        for body in ("bonnet", "arms"):
+            truth, live = self.fly("sand", "--start", 30, "--frames", 40, "--set",
+                                   f"sim.own_body={body}", "--set", "sim.seed=13", calibration=())
+            self.expect_whole(truth, live, 0.05)
 
     def test_darkened_corners_over_bare_sand(self):
         # They stay, and are stronger than anything in the sand.

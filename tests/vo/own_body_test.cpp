@@ -207,6 +207,21 @@ TEST(OwnBodyInView, ItIsLeftOutFromAMapsSecondFrameOnWhereTheWorldIsWeak) {
   }
 }
 
+/// Where the world has most of the texture its motion fits, and the body is so many outliers.
+TEST(OwnBodyInView, ARightMotionOfAMapsSecondFrameShowsIt) {
+  for (const int speed : {2, 3, 4}) {
+    Vehicle vehicle;
+    const SE3 truth = drive(speed);
+    const TrackedFrame tracked = vehicle.track(truth);
+    ASSERT_TRUE(tracked.tracking.good) << speed;
+    EXPECT_LT((tracked.T_world_camera.translation() - truth.translation()).norm(), 0.01) << speed;
+    EXPECT_NE(tracked.views, nullptr) << speed;
+    EXPECT_FALSE(tracked.tracking.motion_denied) << speed;
+    vehicle.map(tracked);
+    EXPECT_FALSE(vehicle.odometry().co_moving_mask().empty()) << speed;
+  }
+}
+
 TEST(OwnBodyInView, AMapDoesWithoutSparsePointsWhereNothingSpeaksAgainstStanding) {
   Vehicle vehicle(100, 0.05F);
   ASSERT_GT(vehicle.sparse_points(), 100U);

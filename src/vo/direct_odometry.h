@@ -109,6 +109,9 @@ class DirectOdometry final : public MonocularBackend {
                                 std::shared_ptr<const TrackingReference> reference);
   void find_motion_hypotheses(const TrackingReference& reference, const MonoFrame& frame,
                               double max_acceleration);
+  /// The likeliest of the motions to try where none is known.
+  std::vector<SE3> likely_unknown(const TrackingReference& reference, const MonoFrame& frame,
+                                  const Affine& affine, const SE3& around);
   /// The tracker's best of these motions; not good when the camera cannot be there.
   TrackingResult track_from_any(const TrackingReference& reference, const MonoFrame& frame,
                                 std::span<const SE3> hypotheses,
@@ -170,6 +173,16 @@ class DirectOdometry final : public MonocularBackend {
   std::optional<TrackingResult> align_rest(const TrackingReference& reference,
                                            const MonoFrame& frame, bool starts,
                                            TrackingResult* before, ChosenCells* co_moving);
+  /// Where the motion of the `rest` leads that is likeliest beside the one `before`.
+  TrackingResult track_rest(const TrackingReference& rest, const MonoFrame& frame,
+                            const TrackingResult& before, bool starts);
+  /// Aligns `from` a pose on without what moves along: what stays in its place since it is far
+  /// tells of the motion, too.
+  std::optional<TrackingResult> track_without(const TrackingReference& reference,
+                                              const MonoFrame& frame, const ChosenCells& co_moving,
+                                              const SE3& from, const Affine& affine);
+  CoarseTracker::Fit fit_of(const TrackingReference& reference, const MonoFrame& frame,
+                            const TrackingResult& tracked);
   /// Compares a tracked frame with those before it, and notes what the next one is compared with.
   TrackedHistory compare_with_past(const TrackingReference& reference, const MonoFrame& frame,
                                    const TrackingResult& tracked);

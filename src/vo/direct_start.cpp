@@ -36,9 +36,7 @@ std::vector<SelectedPixel> DirectOdometry::select_pixels(const MonoFrame& frame,
 void DirectOdometry::drop_sparse_points() {
   Keyframe& k = window_.newest();
   const auto keep = [](auto* points, std::size_t count) {
-    if (count < points->size()) {
-      points->erase(points->begin() + static_cast<std::ptrdiff_t>(count), points->end());
-    }
+    points->erase(points->begin() + static_cast<std::ptrdiff_t>(count), points->end());
   };
   keep(&k.points, before_sparse_->first);
   keep(&k.immature, before_sparse_->second);

@@ -41,6 +41,14 @@ bool is_near(const SE3& motion, double mean_rho, double farthest) {
   return motion.translation().norm() * mean_rho < farthest;
 }
 
+bool is_nearly(const SE3& a, const SE3& b, double mean_rho) {
+  constexpr double kTurn = 0.005;   // [rad]
+  constexpr double kShift = 0.005;  // mean depths
+  const SE3 difference = a * b.inverse();
+  return difference.rotation().log().norm() < kTurn &&
+         difference.translation().norm() * mean_rho < kShift;
+}
+
 double deviation(const KnownMotion& known, const SE3& T_current_reference) {
   return known.sigma > 0.0 ? way_off(known, T_current_reference) / known.sigma : 0.0;
 }

@@ -36,6 +36,9 @@ bool is_reachable(const KnownMotion& known, const SE3& T_current_reference);
 /// the unit of `motion`; `farthest`: how many mean depths it may be.
 bool is_near(const SE3& motion, double mean_rho, double farthest = 1.0);
 
+/// Whether two motions differ by a pixel or so; `mean_rho` as above.
+bool is_nearly(const SE3& a, const SE3& b, double mean_rho);
+
 /// How far a camera was found from where it was expected, in `KnownMotion::sigma`; 0: unknown.
 double deviation(const KnownMotion& known, const SE3& T_current_reference);
 

@@ -243,7 +243,6 @@ TrackingResult DirectOdometry::align_whole_or_rest(const TrackingReference& refe
   const bool same =
       is_nearly(better.T_current_reference, found.T_current_reference, reference.mean_rho);
   if (same) return found;
-  if (const auto moved = start_beside_body(reference, frame, better, views)) return *moved;
   return whole_or_rest(reference, frame, better, views);
 }
 

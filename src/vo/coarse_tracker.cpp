@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "sovo/geometry/linear_solvers.h"
+#include "sovo/vo/moments.h"
 
 namespace sovo {
 
@@ -154,36 +155,16 @@ double least_correlation(const TrackerConfig& config, const LastTracking& last,
   return on_way ? config.min_correlation_on_way : config.min_correlation;
 }
 
-/// Sums of pairs of values.
-struct Moments {
-  double n = 0.0, x = 0.0, y = 0.0, xx = 0.0, yy = 0.0, xy = 0.0;
-  double squared_gradient = 0.0;  ///< Of y.
-
-  /// Pairs that are left out are zero in all four.
-  void add(float one, float a, float b, float squared) {
-    const double da = a;
-    const double db = b;
-    n += one;
-    x += da;
-    y += db;
-    xx += da * da;
-    yy += db * db;
-    xy += da * db;
-    squared_gradient += squared;
+/// Of reference and image, by the weights of the residuals; 0 where either does not vary.
+double correlation_of_agreeing(const WarpedPoints& points, const BrightnessTransfer& transfer) {
+  Moments moments;
+  for (std::size_t i = 0; i < points.n; ++i) {
+    const double a = points.colour[i];
+    moments.add_weighted(points.weight[i], a,
+                         transfer.gain * a + transfer.bias + points.residual[i]);
   }
-
-  /// Pearson's; 0 where either does not vary.
-  double correlation() const {
-    const double var_x = n * xx - x * x;
-    const double var_y = n * yy - y * y;
-    return var_x > 0.0 && var_y > 0.0 ? (n * xy - x * y) / std::sqrt(var_x * var_y) : 0.0;
-  }
-
-  double sharpness() const {
-    const double var_y = n * yy - y * y;
-    return var_y > 0.0 ? n * squared_gradient / var_y : 0.0;
-  }
-};
+  return moments.correlation();
+}
 
 /// Units that make the eight unknowns comparable in the stop test.
 Vec8 tracker_units(double mean_rho) {
@@ -261,7 +242,7 @@ CoarseTracker::Fit CoarseTracker::fit(const TrackingReference& reference, const 
                                       const SE3& T, const BrightnessTransfer& transfer) {
   Linearization out;
   residuals(reference.levels[0], image, T, transfer, norm_for(config_, reference), &out);
-  return {out.saturated, out.energy};
+  return {out.saturated, correlation_of_agreeing(warped_, transfer), out.energy};
 }
 
 double CoarseTracker::unexplained(const TrackingReference& reference, const ReferenceLevel& points,

@@ -73,7 +73,9 @@ class CoarseTracker {
   /// How a motion fits level 0.
   struct Fit {
     double misfits = 0.0;  ///< Share of the points in view whose residual exceeds the cutoff.
-    double energy = 0.0;   ///< Robust, mean of a point [grey levels^2].
+    /// Of reference and image, by the weights of the residuals: what does not agree has no say.
+    double correlation = 0.0;
+    double energy = 0.0;  ///< Robust, mean of a point [grey levels^2].
   };
   Fit fit(const TrackingReference& reference, const ImageF& image, const SE3& T_current_reference,
           const BrightnessTransfer& transfer);

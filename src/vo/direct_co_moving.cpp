@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -7,6 +8,7 @@
 #include "sovo/vo/direct_odometry.h"
 #include "sovo/vo/image_change.h"
 #include "sovo/vo/keyframe_policy.h"
+#include "sovo/vo/motion_hypotheses.h"
 #include "sovo/vo/staying_cells.h"
 
 namespace sovo {
@@ -32,8 +34,13 @@ constexpr double kLessEnergy = 0.6;   ///< which brings its energy down to this 
 // With fewer inliers, and hardly any points that moved, the frame does not fit the map.
 constexpr double kFitsBadly = 0.85;
 constexpr std::size_t kLeastRest = 100;  ///< Points.
-constexpr int kOftenFailed = 4;          ///< Then frames are left out, the more the oftener,
-constexpr int kMostFailed = 8;           ///< until it is every 16th one that is looked at.
+// Motions of a map's second frame to try beside a body, in mean depths of the rest.
+constexpr double kStepAround = 0.02;
+constexpr int kStepsAround = 5;            ///< To either side along each axis.
+constexpr double kFarthestAround = 0.3;    ///< What leads farther fits by chance.
+constexpr std::size_t kStartsAround = 44;  ///< Of all of them, those that fit best as they are.
+constexpr int kOftenFailed = 4;            ///< Then frames are left out, the more the oftener,
+constexpr int kMostFailed = 8;             ///< until it is every 16th one that is looked at.
 
 /// Share of the points that must be where a camera at rest sees them, or one that goes on from rest
 /// where it `stood`, by the share that is where a pose takes them; `leaps`: far from the last one.
@@ -161,10 +168,15 @@ std::optional<TrackingResult> DirectOdometry::align_rest(const TrackingReference
   // A right motion of a map's second frame shows at once what moves along.
   const bool shows = !taken && confirmed && place_unknown_ && found.inlier_ratio >= kFitsBetter;
   if (!taken && !shows) return {};
-  const ChosenCells beyond_doubt = shows ? staying_of(reference, frame, found) : staying;
-  *co_moving = co_moving_cells(config_.co_moving, cells, reference, T_found, beyond_doubt);
-  if ((!moves || shows) && std::ranges::count(*co_moving, 1) == 0) return {};
-  return track_without(reference, frame, *co_moving, T_found, before->affine);
+  const auto find = [&](const ChosenCells& stayed) {
+    *co_moving = co_moving_cells(config_.co_moving, cells, reference, T_found, stayed);
+    return std::ranges::count(*co_moving, 1) > 0;
+  };
+  // Beyond doubt stays what the motion should have taken away.
+  const bool any =
+      (!shows && find(staying)) || ((shows || starts) && find(staying_of(reference, frame, found)));
+  if (!any && (!moves || shows)) return {};
+  return track_without(reference, frame, *co_moving, T_found, before->affine, starts);
 }
 
 TrackingResult DirectOdometry::track_rest(const TrackingReference& rest, const MonoFrame& frame,
@@ -173,16 +185,50 @@ TrackingResult DirectOdometry::track_rest(const TrackingReference& rest, const M
       likely_unknown(rest, frame, before.affine, before.T_current_reference);
   const TrackingResult found =
       tracker_.track(rest, *frame.pyramid, frame.exposure_s, before.affine, motions, {});
-  return starts ? search_ahead(rest, frame, found) : found;
+  return starts ? search_around(rest, frame, before, search_ahead(rest, frame, found)) : found;
+}
+
+TrackingResult DirectOdometry::search_around(const TrackingReference& rest, const MonoFrame& frame,
+                                             const TrackingResult& standing, TrackingResult found) {
+  const auto unexplained = [&](const TrackingResult& pose) {
+    const CoarseTracker::Fit fit = fit_of(rest, frame, pose);
+    return std::sqrt(fit.energy) / std::max(fit.correlation * fit.correlation, 1e-6);
+  };
+  double least = found.good ? unexplained(found) : std::numeric_limits<double>::infinity();
+  const std::vector<SE3> grid =
+      translations_around(standing.T_current_reference, rest.mean_rho, kStepAround, kStepsAround);
+  for (const SE3& start : tracker_.likeliest(rest, *frame.pyramid, frame.exposure_s,
+                                             standing.affine, grid, kStartsAround)) {
+    TrackingResult tried =
+        tracker_.refine(rest, *frame.pyramid, frame.exposure_s, standing.affine, start, {});
+    tried.good = is_believed_beside(rest, frame, tried);
+    if (!tried.good || !is_near(tried.T_current_reference, rest.mean_rho, kFarthestAround))
+      continue;
+    const double left = unexplained(tried);
+    if (left < least) {
+      least = left;
+      found = tried;
+    }
+  }
+  return found;
+}
+
+bool DirectOdometry::is_believed_beside(const TrackingReference& rest, const MonoFrame& frame,
+                                        const TrackingResult& tracked) {
+  return tracked.inlier_ratio >= kFitsBetter && tracked.rmse < config_.tracker.max_rmse &&
+         fit_of(rest, frame, tracked).correlation > config_.tracker.min_correlation;
 }
 
 std::optional<TrackingResult> DirectOdometry::track_without(const TrackingReference& reference,
                                                             const MonoFrame& frame,
                                                             const ChosenCells& co_moving,
-                                                            const SE3& from, const Affine& affine) {
+                                                            const SE3& from, const Affine& affine,
+                                                            bool starts) {
   const ImageCells cells(config_.co_moving.cell, camera_.width, camera_.height);
-  const TrackingResult out = tracker_.track(without(reference, cells, co_moving), *frame.pyramid,
-                                            frame.exposure_s, affine, std::array{from}, {});
+  const TrackingReference world = without(reference, cells, co_moving);
+  TrackingResult out =
+      tracker_.track(world, *frame.pyramid, frame.exposure_s, affine, std::array{from}, {});
+  if (starts && !out.good) out.good = is_believed_beside(world, frame, out);
   const bool reached = !known_motion_ || is_reachable(*known_motion_, out.T_current_reference);
   return out.good && reached ? std::optional(out) : std::nullopt;
 }

@@ -180,7 +180,14 @@ class DirectOdometry final : public MonocularBackend {
   /// tells of the motion, too.
   std::optional<TrackingResult> track_without(const TrackingReference& reference,
                                               const MonoFrame& frame, const ChosenCells& co_moving,
-                                              const SE3& from, const Affine& affine);
+                                              const SE3& from, const Affine& affine, bool starts);
+  /// Where a camera may be rather than where the rest `found` it: anywhere near `standing`.
+  TrackingResult search_around(const TrackingReference& rest, const MonoFrame& frame,
+                               const TrackingResult& standing, TrackingResult found);
+  /// Whether a pose fits where few points of the body, which a weak world does not outweigh, may be
+  /// left: by the points that agree.
+  bool is_believed_beside(const TrackingReference& rest, const MonoFrame& frame,
+                          const TrackingResult& tracked);
   CoarseTracker::Fit fit_of(const TrackingReference& reference, const MonoFrame& frame,
                             const TrackingResult& tracked);
   /// Compares a tracked frame with those before it, and notes what the next one is compared with.

@@ -59,6 +59,18 @@ std::vector<SE3> unknown_translations(const SE3& around, double mean_rho,
   return out;
 }
 
+std::vector<SE3> translations_around(const SE3& around, double mean_rho, double step, int steps) {
+  std::vector<SE3> out;
+  for (int x = -steps; x <= steps; ++x) {
+    for (int y = -steps; y <= steps; ++y) {
+      for (int z = -steps; z <= steps; ++z) {
+        out.push_back(SE3(SO3(), step / mean_rho * Vec3(x, y, z)) * around);
+      }
+    }
+  }
+  return out;
+}
+
 std::vector<SO3> turns(double reach, const CameraModel& level) {
   constexpr int kMostSteps = 8;
   constexpr int kMostRolls = 2;

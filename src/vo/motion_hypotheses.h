@@ -19,6 +19,10 @@ std::vector<SE3> unknown_motions(const SE3& around, double mean_rho,
 std::vector<SE3> unknown_translations(const SE3& around, double mean_rho,
                                       std::span<const double> shares, double ahead);
 
+/// `around` and translations from there on a grid: `steps` to either side along each axis, a `step`
+/// of the mean depth apart.
+std::vector<SE3> translations_around(const SE3& around, double mean_rho, double step, int steps);
+
 /// Turns by up to `reach` around each axis [rad], dense enough for alignment on `level` to begin
 /// from one of them: a pixel of it apart.
 std::vector<SO3> turns(double reach, const CameraModel& level);

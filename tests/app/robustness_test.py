@@ -75,6 +75,16 @@ class Robustness(SimTest):
                                    f"sim.own_body={body}", "--set", "sim.seed=13", calibration=())
             self.expect_whole(truth, live, 0.05)
 
+    def test_the_vehicles_arms_before_a_hazy_pool_that_is_passed_already_at_the_start(self):
+        # The tiles differ by a few grey levels, the arms that hold the lamps by dozens. Where the
+        # lamps are found a new segment begins, in motion as well.
+        for world, start in ((3, 50), (3, 200), (11, 200)):
+            truth, live = self.fly("pool", "--start", start, "--frames", 50, "--set",
+                                   "sim.own_body=arms", "--set", "sim.lamps.count=2", "--set",
+                                   f"sim.seed={world}", calibration=(), veil=0.44)
+            self.assertGreaterEqual(len(live), 45)
+            self.assertLess(largest_error(live, truth, live[0][0]), 0.1)
+
     def test_darkened_corners_over_bare_sand(self):
         # They stay, and are stronger than anything in the sand.
         dark = {"vignette": 0.4, "calibrated": "false"}

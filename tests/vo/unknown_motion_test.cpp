@@ -36,6 +36,24 @@ TEST(UnknownMotion, IsTriedAlongTheAxisAtEvenSteps) {
   }
 }
 
+TEST(UnknownMotion, IsTriedOnAGridAroundAPose) {
+  const SE3 around(SO3::exp(Vec3(0.01, 0.02, -0.01)), Vec3(0.3, 0.0, -0.1));
+  const double mean_rho = 0.5;
+  const std::vector<SE3> tried = translations_around(around, mean_rho, 0.1, 2);
+  ASSERT_EQ(tried.size(), 125U);
+  EXPECT_TRUE(tried[62].translation().isApprox(around.translation(), 1e-12)) << "in the middle";
+  for (const SE3& T : tried) {
+    EXPECT_TRUE(T.rotation().matrix() == around.rotation().matrix());
+    const Vec3 steps = (T.translation() - around.translation()) * mean_rho / 0.1;
+    for (Eigen::Index i = 0; i < 3; ++i) {
+      EXPECT_NEAR(steps[i], std::round(steps[i]), 1e-9);
+      EXPECT_LE(std::abs(steps[i]), 2.0 + 1e-9);
+    }
+  }
+  EXPECT_TRUE((tried.back().translation() - tried.front().translation())
+                  .isApprox(Vec3::Constant(4.0 * 0.1 / mean_rho), 1e-12));
+}
+
 TEST(UnknownMotion, PatternsAreThePixelsAroundPoints) {
   ImageF image(40, 30);
   for (std::size_t i = 0; i < image.size(); ++i) image.data()[i] = static_cast<float>(i % 251);
@@ -127,6 +145,34 @@ TEST(UnknownMotion, ResidualsBeyondTheCutoffTellByCorrelation) {
     left[k] = tracker.unexplained(reference, points, image, 0.0, still);
   }
   EXPECT_GT(left[1], 1.1 * left[0]);
+}
+
+TEST(UnknownMotion, AmongPointsThatAgreeThoseThatDoNotHaveNoSay) {
+  // A weak world with a few points of something strong that is not where they are: a pose that is
+  // right hardly correlates, but for what agrees with it.
+  const SyntheticScene scene(3);
+  TrackingReference reference = reference_of(scene);
+  const ImageF& image = reference.pyramid->level(0);
+  CoarseTracker tracker{TrackerConfig()};
+  const double whole = tracker.fit(reference, image, SE3(), {}).correlation;
+  EXPECT_GT(whole, 0.99);
+  ReferenceLevel& points = reference.levels[0];
+  for (std::size_t i = 0; i < points.size(); i += 20) {
+    points.colour[i] += points.colour[i] > 128.0F ? -120.0F : 120.0F;
+  }
+  const CoarseTracker::Fit fit = tracker.fit(reference, image, SE3(), {});
+  EXPECT_NEAR(fit.misfits, 0.05, 0.01);
+  EXPECT_GT(fit.correlation, whole - 0.005);
+  EXPECT_LT(tracker.refine(reference, *reference.pyramid, 0.0, {}, SE3(), {}).correlation, 0.9);
+  // Nor do they hide that nothing correlates.
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    points.colour[i] = 100.0F + static_cast<float>(i * 7919 % 13);
+  }
+  ImageF noise(image.width(), image.height());
+  for (std::size_t i = 0; i < noise.size(); ++i) {
+    noise.data()[i] = 100.0F + static_cast<float>(i * 104729 % 11);
+  }
+  EXPECT_LT(std::abs(tracker.fit(reference, noise, SE3(), {}).correlation), 0.2);
 }
 
 }  // namespace

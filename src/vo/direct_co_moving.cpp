@@ -31,6 +31,7 @@ constexpr double kMoreBeforeLeap = 0.6;
 // When much agrees better in its place than where the motion takes it.
 constexpr double kFitsBetter = 0.75;  ///< Share of the rest that agrees with another motion,
 constexpr double kLessEnergy = 0.6;   ///< which brings its energy down to this share.
+constexpr double kLeastInView = 0.5;  ///< Share of the rest that has to be in view for it.
 // With fewer inliers, and hardly any points that moved, the frame does not fit the map.
 constexpr double kFitsBadly = 0.85;
 constexpr std::size_t kLeastRest = 100;  ///< Points.
@@ -215,7 +216,8 @@ TrackingResult DirectOdometry::search_around(const TrackingReference& rest, cons
 
 bool DirectOdometry::is_believed_beside(const TrackingReference& rest, const MonoFrame& frame,
                                         const TrackingResult& tracked) {
-  return tracked.inlier_ratio >= kFitsBetter && tracked.rmse < config_.tracker.max_rmse &&
+  return tracked.inlier_ratio >= kFitsBetter && tracked.view_ratio >= kLeastInView &&
+         tracked.rmse < config_.tracker.max_rmse &&
          fit_of(rest, frame, tracked).correlation > config_.tracker.min_correlation;
 }
 

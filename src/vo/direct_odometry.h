@@ -173,7 +173,8 @@ class DirectOdometry final : public MonocularBackend {
   std::optional<TrackingResult> align_rest(const TrackingReference& reference,
                                            const MonoFrame& frame, bool starts,
                                            TrackingResult* before, ChosenCells* co_moving);
-  /// Where the motion of the `rest` leads that is likeliest beside the one `before`.
+  /// The motion that fits the `rest` best, of those to try around `before` where none is known;
+  /// `starts`: it is searched for ahead and all around, too.
   TrackingResult track_rest(const TrackingReference& rest, const MonoFrame& frame,
                             const TrackingResult& before, bool starts);
   /// Aligns `from` a pose on without what moves along: what stays in its place since it is far
@@ -184,8 +185,8 @@ class DirectOdometry final : public MonocularBackend {
   /// Where a camera may be rather than where the rest `found` it: anywhere near `standing`.
   TrackingResult search_around(const TrackingReference& rest, const MonoFrame& frame,
                                const TrackingResult& standing, TrackingResult found);
-  /// Whether a pose fits where few points of the body, which a weak world does not outweigh, may be
-  /// left: by the points that agree.
+  /// Whether a pose fits by the points that agree with it: a few that are on the body after all
+  /// outweigh a weak world.
   bool is_believed_beside(const TrackingReference& rest, const MonoFrame& frame,
                           const TrackingResult& tracked);
   CoarseTracker::Fit fit_of(const TrackingReference& reference, const MonoFrame& frame,

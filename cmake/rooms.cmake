@@ -10,10 +10,9 @@ target_compile_options(sovo_warnings INTERFACE $<$<COMPILE_LANG_AND_ID:CXX,GNU>:
 # that take them are inlined, image/lanes.h), and on ARM of every std::pair.
 target_compile_options(sovo_warnings INTERFACE $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-Wno-psabi>)
 
-# For code that works on messages and files, not on pixels: half of the compiler's time, and with
-# sanitizers a fifth.
+# For code that works on messages and files, not on pixels: half of the compiler's time.
 add_library(sovo_lightly_optimized INTERFACE)
-target_compile_options(sovo_lightly_optimized INTERFACE $<$<NOT:$<CONFIG:Debug>>:-Og>)
+target_compile_options(sovo_lightly_optimized INTERFACE $<$<CONFIG:Release>:-Og>)
 
 # One source gives one result: no fused multiply-add that a compiler may or may not use.
 add_compile_options(-ffp-contract=off -fno-math-errno)

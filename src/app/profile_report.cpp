@@ -14,6 +14,15 @@ double keyframes_per_frame(const RunCounts& counts) {
                          : static_cast<double>(counts.keyframes) / static_cast<double>(counts.fed);
 }
 
+/// Counts and what they are of, by name.
+std::string counted(const std::map<std::string, std::uint64_t>& counts) {
+  std::string text;
+  for (const auto& [name, count] : counts) {
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, name);
+  }
+  return text.empty() ? "none" : text;
+}
+
 }  // namespace
 
 std::string timing_table(const ProfileCollector& profile) {
@@ -59,6 +68,7 @@ std::string run_summary(const ProfileCollector& profile, const RunCounts& counts
   text += fmt::format("frames fed       {}\n", counts.fed);
   text +=
       fmt::format("frames tracked   {} ({:.1f} %)\n", counts.tracked, 100.0 * counts.completion());
+  text += fmt::format("states           {}\n", counted(counts.states));
   text += fmt::format("frames refused   {}, dropped {}\n", counts.rejected, counts.dropped);
   text += fmt::format("keyframes        {} ({:.3f} a frame; {:.0f} points, {:.0f} residuals)\n",
                       counts.keyframes, keyframes_per_frame(counts), work.points, work.residuals);
@@ -72,14 +82,8 @@ std::string run_summary(const ProfileCollector& profile, const RunCounts& counts
         fmt::format("light in corners {:.2f} (the vignette that was found)\n", counts.corner_light);
   }
   text += fmt::format("time a frame     {:.2f} ms\n", frame_ms);
-  text += "scale verdicts   ";
-  if (counts.verdicts.empty()) text += "none";
-  std::string separator;
-  for (const auto& [verdict, count] : counts.verdicts) {
-    text += fmt::format("{}{} {}", separator, count, verdict);
-    separator = ", ";
-  }
-  text += fmt::format("\npeak memory      {:.1f} MB\n", peak_memory_mb());
+  text += fmt::format("scale verdicts   {}\n", counted(counts.verdicts));
+  text += fmt::format("peak memory      {:.1f} MB\n", peak_memory_mb());
   return text;
 }
 

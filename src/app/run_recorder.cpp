@@ -14,12 +14,14 @@ void RunRecorder::on_frame(const OdometryOutput& output) {
   counts_.dropped = output.dropped_queue;
   counts_.corner_light = output.corner_light;
   counts_.state = to_string(output.state);
+  ++counts_.states[counts_.state];
   if (output.pose_valid) counts_.focal_error = output.focal_error;
   if (output.pose_valid && keep_.live_poses) {
     live_.push_back({output.stamp_ns, output.T_odom_left});
   }
-  if (output.reason != last_reason_ && !output.reason.empty()) {
-    spdlog::info("frame {}: {}: {}", output.sequence, counts_.state, output.reason);
+  if (output.reason != last_reason_) {
+    spdlog::info("frame {}: {}{}{}", output.sequence, counts_.state,
+                 output.reason.empty() ? "" : ": ", output.reason);
   }
   last_reason_ = output.reason;
 }

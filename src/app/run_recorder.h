@@ -19,6 +19,7 @@ struct RunCounts {
   std::uint64_t rejected = 0;                     ///< Frames refused.
   std::uint64_t dropped = 0;                      ///< Frames that mapping had no time for.
   std::uint32_t queue_depth = 0;                  ///< Frames that wait for mapping.
+  std::map<std::string, std::uint64_t> states;    ///< Frames by the state they were given.
   std::map<std::string, std::uint64_t> verdicts;  ///< Scale optimizations by verdict.
   double corner_light = 1.0;                      ///< Of the newest frame.
   std::string state;                              ///< And its state.

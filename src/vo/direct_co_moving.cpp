@@ -245,10 +245,17 @@ bool DirectOdometry::is_doubtful(const TrackingReference& reference, const MonoF
                                  TrackingResult* whole) {
   if (!config_.co_moving.enable || !whole->good) return false;
   if (is_at_rest(*whole, reference)) {
-    const ImageChange change = image_change(*reference.pyramid, *frame.pyramid, whole->rmse);
-    whole->rest_denied = denies_rest(change, reference.levels[0]);
-    return whole->inlier_ratio < kFitsWhole || may_deny_rest(change);
+    bool doubtful = whole->inlier_ratio < kFitsWhole;
+    for (const int halvings : {1, 2}) {
+      const ImageChange change =
+          image_change(*reference.pyramid, *frame.pyramid, whole->rmse, halvings);
+      whole->rest_denied |=
+          past_.rest_denial.holds(change, reference.levels[0], reference.keyframe_id, halvings);
+      doubtful |= may_deny_rest(change);
+    }
+    return doubtful;
   }
+  past_.rest_denial.clear();
   const MotionEvidence evidence = evidence_of(reference, frame, *whole);
   whole->motion_denied = evidence.is_doubtful() || evidence.is_missing();
   return whole->motion_denied;

@@ -13,6 +13,7 @@
 #include "sovo/vo/coarse_tracker.h"
 #include "sovo/vo/direct_config.h"
 #include "sovo/vo/exposure_estimate.h"
+#include "sovo/vo/image_change.h"
 #include "sovo/vo/keyframe_policy.h"
 #include "sovo/vo/light_observers.h"
 #include "sovo/vo/map_history.h"
@@ -81,6 +82,7 @@ class DirectOdometry final : public MonocularBackend {
     bool stands = false;            ///< Though much moves, or goes on slowly from there:
     ChosenCells moving;             ///< the cells in which it moved,
     std::uint32_t moving_keyframe = 0;  ///< and of which reference.
+    RestDenial rest_denial;
   };
 
   void trace_all(const MonoFrame& frame, const SE3& T_world_camera, const Affine& affine);

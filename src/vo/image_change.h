@@ -1,5 +1,8 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
+
 #include "sovo/image/pyramid.h"
 #include "sovo/vo/image_cells.h"
 #include "sovo/vo/tracking_reference.h"
@@ -17,9 +20,12 @@ struct ImageChange {
   double share() const;
 };
 
-/// Compares images of half the size, in which what lies a pixel aside looks alike. `rmse`:
-/// residuals of what is as expected [grey levels]. Precondition: they are of one size.
-ImageChange image_change(const ImagePyramid& before, const ImagePyramid& image, double rmse);
+/// Compares images that were halved once or more, in which what lies a pixel aside looks alike:
+/// what haze leaves of the world drowns in the noise of larger ones. `rmse`: residuals of what is
+/// as expected in the whole images [grey levels]. Preconditions: they are of one size; halvings >=
+/// 1.
+ImageChange image_change(const ImagePyramid& before, const ImagePyramid& image, double rmse,
+                         int halvings);
 
 /// Whether what is different may be the world.
 bool may_deny_rest(const ImageChange& change);
@@ -28,5 +34,21 @@ bool may_deny_rest(const ImageChange& change);
 /// much is different, and what stays does not lie behind that, as where something passes before a
 /// camera at rest. `level`: points of the image before, the finest.
 bool denies_rest(const ImageChange& change, const ReferenceLevel& level);
+
+/// What denied rest, against one keyframe: it is denied until most of that looks as it did before,
+/// for not every frame of a world in haze shows it.
+class RestDenial {
+ public:
+  /// Whether the change from keyframe `keyframe_id`, of images that were halved once or twice,
+  /// denies rest, or one before did. Preconditions and `level`: see denies_rest.
+  bool holds(const ImageChange& change, const ReferenceLevel& level, std::uint32_t keyframe_id,
+             int halvings);
+  /// What is not at rest shows nothing of it.
+  void clear() { *this = {}; }
+
+ private:
+  std::uint32_t keyframe_id_ = 0;
+  std::array<ChosenCells, 2> different_;  ///< By halvings; empty where nothing denies.
+};
 
 }  // namespace sovo

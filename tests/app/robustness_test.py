@@ -265,6 +265,16 @@ class RobustnessBesideBodies(Flight):
             if largest_error(live, truth, live[0][0]) > 0.15:
                 self.assertIn("DEGRADED: the camera seems to stand", self.log)
 
+    def test_arms_in_thicker_haze_are_told_at_once(self):
+        # What is left of the world drowns in the noise of whole images, and shows in smaller ones.
+        for world, start in ((11, 50), (21, 200)):
+            truth, live = self.fly("hall", "--trajectory", "race", "--start", start, "--frames", 20,
+                                   "--set", f"sim.seed={world}", "--set", "sim.own_body=arms",
+                                   "--set", "sim.lamps.count=2", calibration=(), veil=0.6)
+            if largest_error(live, truth, live[0][0]) > 0.15:
+                self.assertIn(f"frame {start + 1}: DEGRADED: the camera seems to stand", self.log)
+                self.assertNotIn("TRACKING", self.log)
+
     def test_arms_and_a_world_in_haze_are_not_taken_for_one(self):
         # A way between that of the arms, none, and the true one fits most pixels. The lens darkens
         # the corners, of which the calibration knows nothing.

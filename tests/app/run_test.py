@@ -111,8 +111,8 @@ class Outputs(CommandTest):
         several_keyframes = ["--set", "vo.keyframe.flow_translation=0.08"]
         result = self.expect(sovo("run", "--dataset", DATASET, "--rate", "max", "--frames", 20,
                                   "--start", 5, *several_keyframes, *files), OK)
-        for word in ("frames fed       20", "frames tracked   20 (100.0 %)", "scale verdicts",
-                     "bundle_adjustment"):
+        for word in ("frames fed       20", "frames tracked   20 (100.0 %)", "states           20 TRACKING",
+                     "scale verdicts", "bundle_adjustment"):
             self.assertIn(word, result.stdout)
         truth = [stamp for stamp, _, _ in read_tum(TRUTH)]
         for name in ("out.txt", "live.txt"):

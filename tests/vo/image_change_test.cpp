@@ -18,8 +18,9 @@ constexpr int kViewWidth = 320;
 constexpr int kViewHeight = 192;
 constexpr double kSensorNoise = 2.0;  ///< [grey levels]
 
-/// Texture of some pixels' grain, and noise; the part above `edge` is moved to the side.
-ImagePyramidPtr view(double shift, int edge, unsigned noise_seed) {
+/// Texture of some pixels' grain, and noise; the part above `edge` is moved to the side, and haze
+/// leaves `clear` of its contrast.
+ImagePyramidPtr view(double shift, int edge, unsigned noise_seed, double clear = 1.0) {
   std::mt19937 random(noise_seed);
   std::normal_distribution<float> noise(0.0F, static_cast<float>(kSensorNoise));
   ImageF image(kViewWidth, kViewHeight);
@@ -28,14 +29,15 @@ ImagePyramidPtr view(double shift, int edge, unsigned noise_seed) {
       const double u = y < edge ? x + shift : x;
       const double texture = std::sin(0.31 * u + 0.11 * y) + std::sin(0.23 * y - 0.17 * u) +
                              std::sin(0.05 * u * (1.0 + 0.003 * u));
-      image.at(x, y) = static_cast<float>(120.0 + 15.0 * texture) + noise(random);
+      const double contrast = y < edge ? 15.0 * clear : 15.0;
+      image.at(x, y) = static_cast<float>(120.0 + contrast * texture) + noise(random);
     }
   }
   return pyramid_of(std::move(image));
 }
 
 ImageChange change(double shift, int edge) {
-  return image_change(*view(0.0, edge, 1), *view(shift, edge, 2), kSensorNoise);
+  return image_change(*view(0.0, edge, 1), *view(shift, edge, 2), kSensorNoise, 1);
 }
 
 /// Points all over the image, above `edge` at one inverse depth and below at another.
@@ -73,7 +75,7 @@ TEST(ImageChangeTest, IsNoneWhereFineTextureLiesAPixelAside) {
     }
     return pyramid_of(std::move(image));
   };
-  const ImageChange aside = image_change(*fine(0), *fine(1), kSensorNoise);
+  const ImageChange aside = image_change(*fine(0), *fine(1), kSensorNoise, 1);
   EXPECT_GT(aside.textured, 50);
   EXPECT_EQ(aside.share(), 0.0);
 }
@@ -86,7 +88,7 @@ TEST(ImageChangeTest, OfFewCellsIsNoneHoweverFewHaveTexture) {
     for (int y = 0; y < 32; ++y) std::copy_n(textured->level(0).row(y), 96, image.row(y));
     return pyramid_of(std::move(image));
   };
-  const ImageChange few = image_change(*corner(0.0), *corner(23.0), kSensorNoise);
+  const ImageChange few = image_change(*corner(0.0), *corner(23.0), kSensorNoise, 1);
   EXPECT_EQ(few.textured, 3);
   EXPECT_GT(std::ranges::count(few.different, 1), 0);
   EXPECT_EQ(few.share(), 0.0);
@@ -96,7 +98,7 @@ TEST(ImageChangeTest, IsNoneByOtherLight) {
   ImageF image = view(0.0, kViewHeight, 2)->level(0);
   apply_brightness(0.7, 25.0, &image);
   const ImageChange darker =
-      image_change(*view(0.0, kViewHeight, 1), *pyramid_of(image), kSensorNoise);
+      image_change(*view(0.0, kViewHeight, 1), *pyramid_of(image), kSensorNoise, 1);
   EXPECT_EQ(darker.share(), 0.0);
 }
 
@@ -108,7 +110,7 @@ TEST(ImageChangeTest, IsNoneWhereThereIsNothingButNoise) {
     for (int i = 0; i < kViewWidth * kViewHeight; ++i) image.data()[i] = noise(random);
     return pyramid_of(std::move(image));
   };
-  const ImageChange nothing = image_change(*blank(1), *blank(2), kSensorNoise);
+  const ImageChange nothing = image_change(*blank(1), *blank(2), kSensorNoise, 1);
   EXPECT_EQ(nothing.textured, 0);
   EXPECT_EQ(nothing.share(), 0.0);
 }
@@ -125,6 +127,54 @@ TEST(ImageChangeTest, BeyondABodyThatStaysDeniesRest) {
   EXPECT_TRUE(denies_rest(moved, body));
 }
 
+TEST(ImageChangeTest, OfAWorldInHazeShowsInSmallerImages) {
+  const auto hazy = [](double shift, int halvings) {
+    return image_change(*view(0.0, 144, 1, 0.14), *view(shift, 144, 2, 0.14), kSensorNoise,
+                        halvings);
+  };
+  const ReferenceLevel world_and_body = points(144, 0.3F, 2.0F);
+  EXPECT_FALSE(may_deny_rest(hazy(23.0, 1))) << "whole images show it, and the test nothing";
+  EXPECT_TRUE(may_deny_rest(hazy(23.0, 2)));
+  EXPECT_TRUE(denies_rest(hazy(23.0, 2), world_and_body));
+  for (const double shift : {0.0, 0.7, 1.5}) {
+    const ImageChange rest = hazy(shift, 2);
+    EXPECT_GE(std::ranges::count(rest.same, 1), 8);
+    EXPECT_FALSE(may_deny_rest(rest)) << shift;
+  }
+}
+
+TEST(ImageChangeTest, IsNoneWhereThereIsNothingButNoiseInSmallerImages) {
+  const ImageChange nothing = image_change(*view(0.0, kViewHeight, 1, 0.0),
+                                           *view(0.0, kViewHeight, 2, 0.0), kSensorNoise, 2);
+  EXPECT_EQ(nothing.textured, 0);
+  EXPECT_FALSE(may_deny_rest(nothing));
+}
+
+TEST(RestDenialTest, HoldsUntilWhatWasDifferentLooksAsBefore) {
+  const ReferenceLevel level = points(96, 0.3F, 2.0F);
+  const ImagePyramidPtr before = view(0.0, 96, 1);
+  const auto since = [&](const ImagePyramidPtr& image) {
+    return image_change(*before, *image, kSensorNoise, 1);
+  };
+  const ImageChange same = since(view(0.0, 96, 2));
+  const ImageChange moved = since(view(23.0, 96, 2));
+  ImageChange faint = moved;  // of a frame in which the world hardly shows
+  std::ranges::fill(faint.different, 0);
+  RestDenial denial;
+  EXPECT_FALSE(denial.holds(same, level, 7, 1));
+  EXPECT_FALSE(denial.holds(faint, level, 7, 1));
+  EXPECT_TRUE(denial.holds(moved, level, 7, 1));
+  EXPECT_TRUE(denial.holds(faint, level, 7, 1));
+  EXPECT_FALSE(denial.holds(faint, level, 7, 2)) << "of images of another size";
+  EXPECT_FALSE(denial.holds(same, level, 7, 1));
+  EXPECT_FALSE(denial.holds(faint, level, 7, 1)) << "it was over";
+  EXPECT_TRUE(denial.holds(moved, level, 7, 1));
+  EXPECT_FALSE(denial.holds(faint, level, 8, 1)) << "against another keyframe";
+  EXPECT_TRUE(denial.holds(moved, level, 8, 1));
+  denial.clear();
+  EXPECT_FALSE(denial.holds(faint, level, 8, 1));
+}
+
 TEST(ImageChangeTest, BeforeAWorldThatStaysDoesNot) {
   const ImageChange passing = change(23.0, 96);
   EXPECT_TRUE(may_deny_rest(passing)) << "its share is the same";
@@ -136,7 +186,7 @@ TEST(ImageChangeTest, OfASmallPartDoesNot) {
   const ImagePyramidPtr moved = view(23.0, 32, 2);
   ImageF image = view(0.0, 32, 2)->level(0);
   for (int y = 0; y < 32; ++y) std::copy_n(moved->level(0).row(y), 96, image.row(y));
-  const ImageChange little = image_change(*before, *pyramid_of(image), kSensorNoise);
+  const ImageChange little = image_change(*before, *pyramid_of(image), kSensorNoise, 1);
   EXPECT_GT(std::ranges::count(little.different, 1), 0);
   EXPECT_FALSE(may_deny_rest(little));
   EXPECT_FALSE(denies_rest(little, points(32, 0.3F, 2.0F)));

@@ -28,7 +28,7 @@ ImageChange image_change(const ImagePyramid& before, const ImagePyramid& image, 
   const int level = std::min(halvings, before.num_levels() - 1);
   const ImageF& a = before.level(level);
   const ImageF& b = image.level(level);
-  // Noise falls to a half with each halving; of the first that is left to what does not fit.
+  // Noise falls to a half with each halving; what the first one takes is left to model errors.
   const double noise = std::ldexp(rmse, 1 - std::max(level, 1));
   const ImageCells cells(kCellSide << level, before.level(0).width(), before.level(0).height());
   ImageChange out{cells, ChosenCells(cells.size(), 0), ChosenCells(cells.size(), 0)};

@@ -22,8 +22,8 @@ struct ImageChange {
 
 /// Compares images that were halved once or more, in which what lies a pixel aside looks alike:
 /// what haze leaves of the world drowns in the noise of larger ones. `rmse`: residuals of what is
-/// as expected in the whole images [grey levels]. Preconditions: they are of one size; halvings >=
-/// 1.
+/// as expected in the whole images [grey levels]. `halvings`: from 1 on; at most those that the
+/// pyramids have. Precondition: the images are of one size.
 ImageChange image_change(const ImagePyramid& before, const ImagePyramid& image, double rmse,
                          int halvings);
 
@@ -39,11 +39,11 @@ bool denies_rest(const ImageChange& change, const ReferenceLevel& level);
 /// for not every frame of a world in haze shows it.
 class RestDenial {
  public:
-  /// Whether the change from keyframe `keyframe_id`, of images that were halved once or twice,
-  /// denies rest, or one before did. Preconditions and `level`: see denies_rest.
+  /// Whether the change from keyframe `keyframe_id` denies rest, or one before did. `level`: see
+  /// denies_rest. `halvings`: those of the change, 1 or 2; each has a denial of its own.
   bool holds(const ImageChange& change, const ReferenceLevel& level, std::uint32_t keyframe_id,
              int halvings);
-  /// What is not at rest shows nothing of it.
+  /// For a camera that moves.
   void clear() { *this = {}; }
 
  private:

@@ -64,6 +64,7 @@ Result<void> check_weights(const DirectConfig& vo) {
       {"window.depth_damping", window.depth_damping},
       {"window.place_damping", window.place_damping},
       {"window.static_weight", window.static_weight},
+      {"window.free_static_weight", window.free_static_weight},
       {"window.prior_a", window.prior_a},
       {"window.prior_b", window.prior_b}};
   for (const auto& [key, weight] : weights) {

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "sovo/image/halving.h"
+#include "sovo/odometry/map_stage.h"
 #include "sovo/odometry/new_backend.h"
 #include "sovo/odometry/pixel_matching.h"
 #include "sovo/odometry/trajectory_recorder.h"
@@ -19,27 +20,13 @@ namespace {
 constexpr std::uint32_t kStereoEvery = 5;
 /// Of a camera of which nothing is known yet [m/s].
 constexpr double kUnknownSpeed = 1.0;
+/// Exposures that are no farther apart are as good as one: nothing moves meanwhile.
+constexpr std::int64_t kAtOnceNs = 1'000'000;
 /// Share of the pixels that agree. Of flights with a turned right camera hardly ever have two
 /// keyframes in a row less, under strong caustics nearly all have.
 constexpr double kFitsBadly = 0.77;
 /// So many keyframes wait for a scale, the newest ones: a map may go without one for days.
 constexpr std::size_t kMostWaiting = 200;
-
-Stage stage_of(MapStage stage) {
-  switch (stage) {
-    case MapStage::kTracing:
-      return Stage::kTracing;
-    case MapStage::kSelection:
-      return Stage::kSelection;
-    case MapStage::kStaticMatching:
-      return Stage::kStaticMatching;
-    case MapStage::kBundleAdjustment:
-      return Stage::kBundleAdjustment;
-    case MapStage::kMarginalization:
-      break;
-  }
-  return Stage::kMarginalization;
-}
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -137,12 +124,12 @@ bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage&
     reason_ = start.quality.problem();
     return false;
   }
-  if (stereo()) vo_->use_static_residuals(right_.rig());
-  const bool at_once = right.stamp_offset_ns == 0;
+  // One right image decides on the scale that a map begins with; whether it is right, others tell.
+  if (stereo()) vo_->use_static_residuals(right_.rig(), StaticScale::kHeld);
   T_odom_left_start_ = T_odom_left;
   scale_path_.restart(T_odom_left.translation());
   vo_->begin(frame, T_odom_left_start_, start.points,
-             stereo() && at_once ? right_pyramid : nullptr);
+             stereo() && right.stamp_offset_ns == 0 ? right_pyramid : nullptr);
   readout_motion_.begin(*vo_->reference());
   exposure_motion_.note(*vo_->reference(), SE3(), frame.stamp_ns);
   // Matching errors are independent; what remains is common to all: the calibration, and where the
@@ -241,14 +228,19 @@ bool MapSegment::matches_new_pixels() const {
   if (config_.mode == OdometryMode::kMono || config_.depth_init == DepthInit::kTemporal)
     return false;
   // Static residuals need them: their images' brightness is fitted there.
-  return config_.depth_init == DepthInit::kStereo || static_residuals() || assist_.wanted();
+  const bool held = stereo() || (config_.backend == Backend::kDirect && assist_.holds_scale());
+  return config_.depth_init == DepthInit::kStereo || held || assist_.wanted();
 }
 
-bool MapSegment::static_residuals() const {
-  const bool assisted = config_.mode == OdometryMode::kScale &&
-                        config_.backend == Backend::kDirect &&
-                        config_.depth_init != DepthInit::kTemporal && assist_.holds_scale();
-  return stereo() || assisted;
+std::optional<StaticScale> MapSegment::static_residuals(const SideImage& right) const {
+  if (stereo()) return StaticScale::kHeld;
+  if (config_.mode != OdometryMode::kScale || config_.backend != Backend::kDirect) return {};
+  if (config_.depth_init == DepthInit::kTemporal) return {};
+  if (assist_.holds_scale()) return StaticScale::kHeld;
+  const bool at_once = std::abs(right.stamp_offset_ns) < kAtOnceNs;
+  const bool free = config_.vo.window.free_static_weight > 0.0 && at_once;
+  if (free && config_.depth_init == DepthInit::kStereo) return StaticScale::kFree;
+  return {};
 }
 
 TrackedFrame MapSegment::track(const MonoFrame& frame) {
@@ -295,8 +287,8 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
       keyframe_stereo.depths = stereo_proposer(tracked.frame.pyramid, *job.right, job.T_later_left);
     }
     keyframe_stereo.T_later_left = job.T_later_left;
-    if (static_residuals() && metric) {
-      vo_->use_static_residuals(right_.rig());
+    if (const auto statics = static_residuals(*right); statics && metric) {
+      vo_->use_static_residuals(right_.rig(), *statics);
       keyframe_stereo.right = job.right;
     }
   }

@@ -155,9 +155,10 @@ class MapSegment {
   bool metric() const { return filter_.locked() && config_.mode != OdometryMode::kMono; }
   /// Whether new pixels get their depths from the right image.
   bool matches_new_pixels() const;
-  /// Whether the next keyframe gets static residuals: always in mode `stereo`, and in mode `scale`
-  /// while scale optimization sees too few points.
-  bool static_residuals() const;
+  /// Whether the next keyframe gets static residuals. They hold the scale in mode `stereo`, and in
+  /// mode `scale` while scale optimization sees too few points; else that is left to it, where both
+  /// cameras expose at once: what a map with a wrong scale knows of the way between is wrong, too.
+  std::optional<StaticScale> static_residuals(const SideImage& right) const;
   /// Whether static residuals own the scale, not similarities.
   bool stereo() const { return config_.mode == OdometryMode::kStereo; }
   KeyframeOutput first_keyframe(const MonoFrame& frame, const ImagePyramidPtr& right) const;

@@ -313,6 +313,21 @@ double BundleAdjuster::scale_information(const WindowLinearization& at,
   return information;
 }
 
+void BundleAdjuster::refine_static_scale(Window* window) {
+  constexpr double kLargestStep = 0.1;  // of its logarithm
+  problem_.linearize(now_, {.system = false, .targets = 0}, &now_);
+  const std::vector<PointRef>& points = problem_.points();
+  double gradient = 0.0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (now_.statics[i].state != ResidualState::kIn) continue;
+    gradient += points[i].point->rho * static_cast<double>(now_.statics[i].depth.gradient);
+  }
+  const double information = scale_information(now_, points);
+  if (information <= 0.0) return;
+  const double step = std::clamp(-gradient / information, -kLargestStep, kLargestStep);
+  window->rescale_statics(std::exp(step));
+}
+
 bool BundleAdjuster::tells_lens(const Window& window) const {
   // What is told where no two keyframes turn so far would not count, and takes time.
   return config_.lens_every > 0 && window.size() > 2 &&
@@ -368,7 +383,7 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   BundleResult result;
   if (window->rig() != nullptr) {
     for (int i = 0; i < window->size(); ++i) {
-      refine_right_brightness(*window->rig(), config_, &(*window)[i]);
+      refine_right_brightness(*window->rig(), config_, window->static_scale(), &(*window)[i]);
     }
   }
   problem_.pose(collect_points(window), window);
@@ -377,6 +392,7 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   const auto newest = static_cast<unsigned>(window->size() - 1);
   problem_.linearize(now_, {.system = false, .statics = false, .targets = 1U << newest}, &now_);
   update_outlier_threshold(now_, window);
+  if (window->static_scale_free()) refine_static_scale(window);
   problem_.linearize(now_, {}, &now_);
   const std::vector<SE3> before = window->poses();
   const NormalEquations solved = iterate(window, &result);
@@ -401,7 +417,8 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   result.gradient_scatter = problem_.gradient_scatter(now_, static_cast<int>(newest));
   result.newest_covariance =
       keyframe_variance(result.rmse, result.gradient_scatter) * newest_covariance(*window, H);
-  if (const double information = scale_information(now_, problem_.points()); information > 0.0) {
+  if (const double information = scale_information(now_, problem_.points());
+      information > 0.0 && !window->static_scale_free()) {
     // Static residuals weigh more than their noise would have it, and those of a keyframe share the
     // errors of its right image.
     constexpr double kSharedRight = 1.6;

@@ -104,6 +104,9 @@ class BundleAdjuster {
   /// last system that was solved.
   NormalEquations iterate(Window* window, BundleResult* result);
   void drop_bad_residuals(Window* window) const;
+  /// What static residuals of a free scale agree about is no more than that scale: a Gauss-Newton
+  /// step of its logarithm, the depths held. What is left of them in `now_` is their part.
+  void refine_static_scale(Window* window);
   bool tells_lens(const Window& window) const;
   /// For residuals of unit noise. Before linearization points move.
   std::optional<LensEvidence> lens_evidence(const Window& window);

@@ -156,6 +156,7 @@ struct WindowConfig {
   bool equal_blur = true;                  ///< Colours are blurred as the target blurs them.
   double point_spread_px = 0.5;            ///< Standard deviation of a camera's point spread [px].
   double static_weight = 4.0;              ///< Of residuals in a keyframe's own right image.
+  double free_static_weight = 1.0;         ///< Of such that leave the scale free; 0: none.
   double prior_a = 1e4;                    ///< Weight of the prior on each frame's log-gain.
   double prior_b = 1.0;                    ///< The same for the bias.
   double min_relative_information = 50.0;  ///< H_rho * mean_rho^2 of a point to be marginalized.
@@ -188,6 +189,9 @@ struct WindowConfig {
     v("point_spread_px", point_spread_px, "standard deviation of a camera's point spread [px]");
     v("static_weight", static_weight,
       "mode stereo: weight of residuals in a keyframe's own right image");
+    v("free_static_weight", free_static_weight,
+      "mode scale, direct, depth_init stereo: weight of the same residuals, which tell depths "
+      "relative to each other and leave the scale to scale optimization; 0: none");
     v("prior_a", prior_a, "weight of the prior on each frame's log-gain");
     v("prior_b", prior_b, "weight of the prior on each frame's bias");
     v("min_relative_information", min_relative_information,

@@ -37,7 +37,9 @@ class DirectOdometry final : public MonocularBackend {
   DirectOdometry(const DirectConfig& config, const CameraModel& camera, const ImageU8& mask,
                  int seed, WorkerPool* pool, const LightObservers& light = {});
 
-  void use_static_residuals(const StereoRig& rig) override { window_.set_rig(rig); }
+  void use_static_residuals(const StereoRig& rig, StaticScale scale) override {
+    window_.set_rig(rig, scale);
+  }
   int wanted_points() const override { return config_.points.active_points; }
   std::vector<SelectedPixel> select_pixels(const MonoFrame& frame, int wanted) override;
   /// Points with a depth become active, the others immature.

@@ -16,6 +16,7 @@
 #include "sovo/vo/keyframe_poses.h"
 #include "sovo/vo/monocular_odometry.h"
 #include "sovo/vo/pixel_selector.h"
+#include "sovo/vo/static_scale.h"
 
 namespace sovo {
 
@@ -150,9 +151,10 @@ class MonocularBackend {
   MonocularBackend& operator=(const MonocularBackend&) = delete;
   virtual ~MonocularBackend() = default;
 
-  /// From now on keyframes with a right image get static residuals, which hold the scale.
-  /// `rig.left` is the camera that is tracked. Throws std::logic_error where a backend has none.
-  virtual void use_static_residuals(const StereoRig& rig) = 0;
+  /// From now on keyframes with a right image get static residuals, which hold the scale or leave
+  /// it free. `rig.left` is the camera that is tracked. Throws std::logic_error where a backend has
+  /// none.
+  virtual void use_static_residuals(const StereoRig& rig, StaticScale scale) = 0;
 
   /// Points that a map should have.
   virtual int wanted_points() const = 0;

@@ -268,10 +268,11 @@ const LinearizedResidual* PhotometricProblem::evaluate(const Block& block, std::
 StoredStatic PhotometricProblem::stored_static(const Keyframe& host,
                                                const LinearizedResidual& r) const {
   StoredStatic out;
-  const auto weight = static_cast<float>(config_.static_weight);
+  const auto weight = static_cast<float>(static_weight(config_, *window_));
+  const auto scale = static_cast<float>(static_scale_);  // of the inverse depth looked at
   const DepthPart part = depth_part(r);
   out.raw_energy = r.raw_energy;
-  out.depth = {weight * part.hessian, weight * part.gradient};
+  out.depth = {weight * scale * scale * part.hessian, weight * scale * part.gradient};
   out.textured = is_textured(r);
   const Verdict verdict = judge(host, host, r.raw_energy, out.textured);
   out.state = verdict.state;
@@ -286,7 +287,8 @@ void PhotometricProblem::evaluate_static(const Block& block, std::size_t point,
   SampledResidual& at = sampled_statics_[point];
   const Point& p = *points_[point].point;
   const Keyframe& host = (*window_)[block.host];
-  const auto rho_change = static_cast<float>(p.rho - at.rho);
+  const double rho = static_scale_ * p.rho;
+  const auto rho_change = static_cast<float>(rho - at.rho);
   const PatternShift shift = {at.linearized.du_rho * rho_change, at.linearized.dv_rho * rho_change,
                               0.0F, 0.0F};
   const auto limit = static_cast<float>(config_.resample_px);
@@ -298,8 +300,8 @@ void PhotometricProblem::evaluate_static(const Block& block, std::size_t point,
     return;
   }
   at.problem = problem_;
-  linearize_static(*window_->rig(), config_, host, p, &at.linearized);
-  at.rho = p.rho;
+  linearize_static(*window_->rig(), config_, host, p, rho, &at.linearized);
+  at.rho = rho;
   const bool in_view = at.linearized.state != ResidualState::kOutOfView;
   at.linearization = in_view ? 0 : -1;
   if (in_view) {
@@ -315,6 +317,7 @@ void PhotometricProblem::linearize(const WindowLinearization& known, const Reque
   out->statics.resize(known.statics.size());
   out->depths.resize(known.depths.size());
   std::vector<double> energies(blocks_.size());
+  static_scale_ = request.at_frozen_poses ? 1.0 : window_->static_scale();
   remember_poses();
   if (request.at_frozen_poses) shifts_ = relative_displacements(*window_, states_.back());
   pool_->run(static_cast<int>(blocks_.size()), [&](int i) {
@@ -351,7 +354,7 @@ void PhotometricProblem::reclassify(WindowLinearization* at) const {
         const Keyframe& host = (*window_)[block.host];
         const Verdict verdict = judge(host, host, s.raw_energy, s.textured);
         s.state = verdict.state;
-        s.energy = static_cast<float>(config_.static_weight) * verdict.energy;
+        s.energy = static_cast<float>(static_weight(config_, *window_)) * verdict.energy;
         depth.add(s);
       }
       at->depths[i] = depth;

@@ -115,7 +115,8 @@ class PhotometricProblem {
   struct Request {
     bool system = true;  ///< Whether the normal equations of the inliers are wanted.
     /// Move residuals to the frozen poses; the depths keep their present values as linearization
-    /// point.
+    /// point. Residuals into right images look where the depths are in metres, whether or not
+    /// their scale is free: what is folded into the prior keeps the scale that stereo sees.
     bool at_frozen_poses = false;
     bool statics = true;  ///< Whether residuals into right images are linearized.
     /// Bit i: whether residuals into keyframe i are linearized; others stay as they are in `out`.
@@ -194,6 +195,7 @@ class PhotometricProblem {
   std::vector<double> damping_;
   std::vector<std::size_t> first_;  ///< First residual of each point, and one past the last.
   std::vector<Block> blocks_;
+  double static_scale_ = 1.0;                       ///< Of the linearization at hand.
   std::vector<HostSums> sums_;                      ///< Of each block.
   std::uint32_t problem_ = 0;                       ///< How many have been posed.
   AlignedVector<SampledResidual> sampled_;          ///< Every residual, and memory for more.

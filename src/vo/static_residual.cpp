@@ -67,12 +67,12 @@ std::vector<PatternMeans> better_half(std::vector<PatternMeans> means,
 }  // namespace
 
 void linearize_static(const StereoRig& rig, const WindowConfig& config, const Keyframe& host,
-                      const Point& point, LinearizedResidual* out) {
+                      const Point& point, double rho, LinearizedResidual* out) {
   out->state = ResidualState::kOutOfView;
   out->energy = 0.0F;
   const EpipolarCurve curve =
       right_curve(rig, rig.T_right_left * host.T_later_left, Vec2(point.u, point.v));
-  const auto at = curve.at(point.rho);
+  const auto at = curve.at(rho);
   if (!at) return;
   const ImageF& image = host.right->level(0);
   PatternProjection projection;
@@ -89,7 +89,8 @@ void linearize_static(const StereoRig& rig, const WindowConfig& config, const Ke
   out->energy = out->raw_energy;
 }
 
-void refine_right_brightness(const StereoRig& rig, const WindowConfig& config, Keyframe* keyframe) {
+void refine_right_brightness(const StereoRig& rig, const WindowConfig& config, double scale,
+                             Keyframe* keyframe) {
   if (!keyframe->right) return;
   BrightnessTransfer& brightness = keyframe->right_brightness;
   // Of the log-gain and the bias, with a prior on a change: few points tell little.
@@ -100,7 +101,7 @@ void refine_right_brightness(const StereoRig& rig, const WindowConfig& config, K
   for (const Point& p : keyframe->points) {
     if (p.static_state != ResidualState::kIn) continue;
     LinearizedResidual r;
-    linearize_static(rig, config, *keyframe, p, &r);
+    linearize_static(rig, config, *keyframe, p, scale * p.rho, &r);
     if (r.state == ResidualState::kOutOfView) continue;
     if (judge(*keyframe, *keyframe, r.raw_energy, is_textured(r)).state != ResidualState::kIn) {
       continue;

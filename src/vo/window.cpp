@@ -54,9 +54,16 @@ void Window::renumber() {
 void Window::clear() {
   keyframes_.clear();
   prior_ = Prior();
+  static_scale_ = 1.0;
   scale_held_ = false;
   keyframes_without_statics_ = 0;
   renumber();
+}
+
+void Window::set_rig(const StereoRig& rig, StaticScale scale) {
+  rig_ = rig;
+  static_scale_free_ = scale == StaticScale::kFree;
+  if (!static_scale_free_) static_scale_ = 1.0;
 }
 
 void Window::update_scale_held() {
@@ -64,6 +71,7 @@ void Window::update_scale_held() {
   constexpr int kForgotten = 20;  // keyframes, three times a window's
   std::ptrdiff_t residuals = 0;
   for (const auto& k : keyframes_) {
+    if (static_scale_free_) break;
     residuals += std::count_if(k->points.begin(), k->points.end(),
                                [](const Point& p) { return p.static_state == ResidualState::kIn; });
   }
@@ -193,6 +201,7 @@ void Window::apply_similarity(double scale) {
   Vec8 s;
   s << scale, scale, scale, 1, 1, 1, 1, 1;
   const auto rho_scale = static_cast<float>(1.0 / scale);
+  if (static_scale_free_) rescale_statics(scale);
   for (auto& k : keyframes_) {
     SE3& T0 = k->frozen_T_camera_world;
     T0.translation() = scale * T0.translation() - (1.0 - scale) * (T0.rotation() * centre);

@@ -16,6 +16,7 @@
 #include "sovo/vo/immature_point.h"
 #include "sovo/vo/motion_blur.h"
 #include "sovo/vo/pattern.h"
+#include "sovo/vo/static_scale.h"
 
 namespace sovo {
 
@@ -146,10 +147,16 @@ class Window {
 
   const CameraModel& camera() const { return camera_; }
 
-  /// Static residuals into a right camera take part: they hold the scale. `rig.left` is `camera()`.
-  void set_rig(const StereoRig& rig) { rig_ = rig; }
+  /// Static residuals into a right camera take part. `rig.left` is `camera()`.
+  void set_rig(const StereoRig& rig, StaticScale scale = StaticScale::kHeld);
   /// Null without static residuals.
   const StereoRig* rig() const { return rig_ ? &*rig_ : nullptr; }
+  bool static_scale_free() const { return static_scale_free_; }
+  /// By what inverse depths of the map are multiplied where static residuals look [1/m over the
+  /// map's unit]: 1 where these hold the scale.
+  double static_scale() const { return static_scale_; }
+  /// Multiplies that, of static residuals whose scale is free.
+  void rescale_statics(double factor) { static_scale_ *= factor; }
   /// Whether static residuals, present or folded into the prior, hold the scale: then it is no
   /// gauge direction.
   bool scale_held() const { return scale_held_; }
@@ -204,7 +211,8 @@ class Window {
 
   /// Applies the similarity p -> centre + scale * (p - centre), the centre being the newest
   /// keyframe's: poses, inverse depths, immature intervals, linearization points, the prior with
-  /// its displacement. The photometric energy does not change.
+  /// its displacement, and the scale of static residuals where it is free. The photometric energy
+  /// does not change.
   void apply_similarity(double scale);
 
   /// Moves the world, poses and linearization points alike, so that keyframe `index` is at
@@ -230,6 +238,8 @@ class Window {
 
   CameraModel camera_;
   std::optional<StereoRig> rig_;
+  bool static_scale_free_ = false;
+  double static_scale_ = 1.0;
   bool scale_held_ = false;
   int keyframes_without_statics_ = 0;
   std::vector<std::unique_ptr<Keyframe>> keyframes_;

@@ -5,6 +5,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <functional>
+#include <iterator>
+#include <random>
 
 #include "sovo/vo/marginalization.h"
 #include "support/numeric.h"
@@ -48,9 +50,9 @@ using Grey = std::function<float(int keyframe, int x, int y, float seen)>;
 float as_seen(int /*keyframe*/, int /*x*/, int /*y*/, float seen) { return seen; }
 
 /// `scene_window` with the right images of its keyframes.
-Window stereo_window(const Grey& grey = as_seen, std::uint32_t first_id = 1) {
-  Window window = scene_window(kStereoKeyframes, kStride, first_id);
-  window.set_rig(bent_rig());
+Window stereo_window(const Grey& grey = as_seen, StaticScale scale = StaticScale::kHeld) {
+  Window window = scene_window(kStereoKeyframes, kStride, 1);
+  window.set_rig(bent_rig(), scale);
   for (int i = 0; i < window.size(); ++i) {
     ImageF image = right_views()[static_cast<std::size_t>(i)];
     for (int y = 0; y < image.height(); ++y) {
@@ -66,7 +68,7 @@ Window stereo_window(const Grey& grey = as_seen, std::uint32_t first_id = 1) {
 
 LinearizedResidual static_residual(const Window& window, int host, const Point& point) {
   LinearizedResidual out;
-  linearize_static(*window.rig(), WindowConfig(), window[host], point, &out);
+  linearize_static(*window.rig(), WindowConfig(), window[host], point, point.rho, &out);
   return out;
 }
 
@@ -193,7 +195,7 @@ TEST(StaticResidual, BrightnessOfTheRightCameraIsRefinedFromItsResiduals) {
   Keyframe& k = window[1];
   for (const Vec2& off : {Vec2(1.1, 5.0), Vec2(0.93, -4.0)}) {
     k.right_brightness = {0.7 * off.x(), 25.0 + off.y()};
-    for (int i = 0; i < 4; ++i) refine_right_brightness(*window.rig(), WindowConfig(), &k);
+    for (int i = 0; i < 4; ++i) refine_right_brightness(*window.rig(), WindowConfig(), 1.0, &k);
     // A little less than 0.7: between its pixels the right image has less contrast.
     EXPECT_NEAR(k.right_brightness.gain, 0.69, 0.02);
     EXPECT_NEAR(k.right_brightness.bias, 26.5, 3.0);
@@ -201,7 +203,7 @@ TEST(StaticResidual, BrightnessOfTheRightCameraIsRefinedFromItsResiduals) {
   // Nothing to refine it from, and nothing that moves it.
   for (Point& p : k.points) p.static_state = ResidualState::kAbsent;
   const BrightnessTransfer before = k.right_brightness;
-  refine_right_brightness(*window.rig(), WindowConfig(), &k);
+  refine_right_brightness(*window.rig(), WindowConfig(), 1.0, &k);
   EXPECT_EQ(k.right_brightness.gain, before.gain);
   EXPECT_EQ(k.right_brightness.bias, before.bias);
 }
@@ -353,6 +355,116 @@ TEST(StaticResidual, PassIntoThePriorWithTheirPoints) {
   marginalize_points(WindowConfig(), leaving, &mono, &pool);
   EXPECT_GT(held, 100.0);
   EXPECT_LT(std::abs(scale.dot(mono.prior().H * scale)), 1e-3 * held);
+}
+
+/// A window whose map is too large by this factor, with static residuals that leave that be.
+Window free_window(double too_large) {
+  Window window = stereo_window(as_seen, StaticScale::kFree);
+  window.apply_similarity(too_large);
+  window.rescale_statics(1.0 / too_large);  // nothing is known of it yet
+  return window;
+}
+
+TEST(FreeStaticScale, IsFoundAndTheMapKeepsItsOwn) {
+  for (const double wrong : {0.97, 1.03}) {
+    Window window = free_window(wrong);
+    EXPECT_FALSE(window.scale_held());
+    EXPECT_EQ(BundleAdjuster::gauge_basis(window, BundleAdjuster::state_units(window)).cols(), 7);
+    EXPECT_NEAR(adjusted_scale(&window), wrong, 5e-3);
+    EXPECT_NEAR(window.static_scale(), wrong, 5e-3);
+  }
+}
+
+TEST(FreeStaticScale, PointsThatTheRightImageAloneSeesFitTheMap) {
+  constexpr double kWrong = 1.03;
+  const Window truth = stereo_window();
+  Window window = free_window(kWrong);
+  std::mt19937 random(1);
+  std::vector<double> size_before;
+  for (Point& p : window[1].points) {
+    const double error = 0.03 * normal(random);
+    p.rho *= std::exp(error);
+    size_before.push_back(std::abs(error));
+    for (Residual& r : p.residuals) r = Residual();
+  }
+  adjusted_scale(&window);
+  std::vector<double> off;
+  for (std::size_t i = 0; i < window[1].points.size(); ++i) {
+    const Point& p = window[1].points[i];
+    if (p.static_state == ResidualState::kIn) {
+      off.push_back(std::log(p.rho * kWrong / truth[1].points[i].rho));
+    }
+  }
+  ASSERT_GT(off.size(), 50U);
+  std::vector<double> size;
+  std::transform(off.begin(), off.end(), std::back_inserter(size),
+                 [](double x) { return std::abs(x); });
+  EXPECT_NEAR(median(off), 0.0, 3e-3) << "not where stereo has them";
+  EXPECT_LT(median(size), 0.6 * median(size_before));
+}
+
+TEST(FreeStaticScale, GoesAlongWithASimilarity) {
+  Window window = free_window(1.02);
+  adjusted_scale(&window);
+  const auto energy = [&window] {
+    double sum = 0.0;
+    for (const StoredStatic& s : linearized(WindowConfig(), &window).statics) {
+      sum += static_cast<double>(s.energy);
+    }
+    return sum;
+  };
+  const double before = energy();
+  ASSERT_GT(before, 0.0);
+  window.apply_similarity(1.4);
+  EXPECT_NEAR(energy(), before, 1e-3 * before);
+}
+
+TEST(FreeStaticScale, DepthsHaveTheDerivativesOfCentralDifferences) {
+  Window window = stereo_window(as_seen, StaticScale::kFree);
+  window.apply_similarity(1.4);
+  const WindowConfig config;
+  const WindowLinearization at = linearized(config, &window);
+  WorkerPool pool(1);
+  int checked = 0;
+  const std::vector<PointRef> points = collect_points(&window);
+  for (std::size_t i = 0; i < points.size(); i += 7) {
+    if (at.statics[i].state != ResidualState::kIn) continue;
+    Point& p = *points[i].point;
+    const double rho = p.rho;
+    const auto gradient = [&](const Eigen::Matrix<double, 1, 1>& x) {
+      p.rho = x[0];
+      PhotometricProblem problem(config, {points[i]}, &window, &pool);
+      WindowLinearization out;
+      problem.linearize(problem.stored(), {.targets = 0}, &out);
+      return Eigen::Matrix<double, 1, 1>(static_cast<double>(out.statics[0].depth.gradient));
+    };
+    // Of squares of a smooth pattern near its place the gradient rises by the Hessian.
+    const double slope =
+        central_differences<1, 1>(gradient, Eigen::Matrix<double, 1, 1>(rho), 1e-3 * rho)(0, 0);
+    p.rho = rho;
+    const auto hessian = static_cast<double>(at.statics[i].depth.hessian);
+    checked += std::abs(slope - hessian) < 0.3 * hessian ? 1 : 0;
+  }
+  EXPECT_GT(checked, 10);
+}
+
+TEST(FreeStaticScale, WhatLeavesPullsTheMapToMetres) {
+  WorkerPool pool(1);
+  const auto pull = [&pool](double too_large) {
+    Window window = free_window(too_large);
+    window.rescale_statics(too_large);  // found
+    std::vector<PointRef> leaving;
+    for (Point& p : window[0].points) leaving.push_back({0, &p});
+    marginalize_points(WindowConfig(), leaving, &window, &pool);
+    double gradient = 0.0;
+    for (int i = 0; i < window.size(); ++i) {
+      gradient += window.prior().b.segment<3>(8 * i).dot(window[i].T_camera_world.translation());
+    }
+    return gradient;
+  };
+  EXPECT_GT(pull(1.01), 0.0);
+  EXPECT_LT(pull(0.99), 0.0);
+  EXPECT_GT(pull(1.01) - pull(0.99), 10.0 * std::abs(pull(1.0)));
 }
 
 TEST(StaticResidual, VarianceOfTheScaleIsThatOfNoisyRightImages) {

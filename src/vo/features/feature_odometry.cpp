@@ -82,7 +82,7 @@ FeatureOdometry::FeatureOdometry(const FeatureConfig& config, const KeyframeConf
   window_.camera = camera;
 }
 
-void FeatureOdometry::use_static_residuals(const StereoRig& /*rig*/) {
+void FeatureOdometry::use_static_residuals(const StereoRig& /*rig*/, StaticScale /*scale*/) {
   throw std::logic_error("the feature-based odometry has no static residuals");
 }
 

@@ -25,7 +25,7 @@ class FeatureOdometry final : public MonocularBackend {
   FeatureOdometry(const FeatureConfig& config, const KeyframeConfig& keyframe,
                   const CameraModel& camera, const ImageU8& mask, WorkerPool* pool);
 
-  void use_static_residuals(const StereoRig& rig) override;
+  void use_static_residuals(const StereoRig& rig, StaticScale scale) override;
   int wanted_points() const override { return config_.features; }
   std::vector<SelectedPixel> select_pixels(const MonoFrame& frame, int wanted) override;
   void begin(const MonoFrame& frame, const SE3& T_world_camera,

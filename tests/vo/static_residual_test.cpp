@@ -9,6 +9,7 @@
 #include <random>
 
 #include "sovo/vo/marginalization.h"
+#include "sovo/vo/median.h"
 #include "support/numeric.h"
 #include "vo/window_test_support.h"
 
@@ -399,8 +400,8 @@ TEST(FreeStaticScale, PointsThatTheRightImageAloneSeesFitTheMap) {
   std::vector<double> size;
   std::transform(off.begin(), off.end(), std::back_inserter(size),
                  [](double x) { return std::abs(x); });
-  EXPECT_NEAR(median(off), 0.0, 3e-3) << "not where stereo has them";
-  EXPECT_LT(median(size), 0.6 * median(size_before));
+  EXPECT_NEAR(sovo::median(&off), 0.0, 3e-3) << "not where stereo has them";
+  EXPECT_LT(sovo::median(&size), 0.6 * sovo::median(&size_before));
 }
 
 TEST(FreeStaticScale, GoesAlongWithASimilarity) {

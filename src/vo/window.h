@@ -151,6 +151,7 @@ class Window {
   void set_rig(const StereoRig& rig, StaticScale scale = StaticScale::kHeld);
   /// Null without static residuals.
   const StereoRig* rig() const { return rig_ ? &*rig_ : nullptr; }
+  /// Whether static residuals leave the scale to others (`StaticScale::kFree`).
   bool static_scale_free() const { return static_scale_free_; }
   /// By what inverse depths of the map are multiplied where static residuals look [1/m over the
   /// map's unit]: 1 where these hold the scale.

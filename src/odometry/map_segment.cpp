@@ -136,7 +136,7 @@ bool MapSegment::initialize_from_stereo(const MonoFrame& frame, const SideImage&
   // right camera went until its own exposure, as no motion is known yet.
   const double moved = kUnknownSpeed * 1e-9 * static_cast<double>(right.stamp_offset_ns);
   filter_.lock_initial(std::hypot(start.scale_sigma, moved / rig().baseline()), frame.stamp_ns);
-  publish_scale(nullptr, true);
+  publish_scale(nullptr, frame.stamp_ns);
   initialized_ = true;
   reason_.clear();
   MappingOutcome outcome;
@@ -299,7 +299,7 @@ MappingOutcome MapSegment::map(const TrackedFrame& tracked, const SideImage* rig
   if (!out.map.is_keyframe || out.map.failed) return out;
   assist_.on_keyframe(static_cast<double>(out.map.active_points) / vo_->wanted_points(),
                       tracked.tracking.inlier_ratio);
-  window_scale_variance_ = out.map.bundle.scale_variance + std::pow(config_.scale.sigma_floor, 2);
+  held_scale_ = held_scale(out.map.bundle, config_.scale);
   if (observer_ != nullptr) {
     observer_->on_window(static_cast<std::uint32_t>(out.map.bundle.points),
                          static_cast<std::uint32_t>(out.map.bundle.residuals));
@@ -346,8 +346,9 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
   last_keyframe_position_ = position;
 
   const double sigma_before = filter_.path_sigma();
-  const ScaleUpdate update =
-      stereo() ? filter_.watch(m, window_scale_variance_) : filter_.update(m);
+  const ScaleUpdate update = stereo() ? filter_.watch(m, held_scale_.variance) : filter_.update(m);
+  const bool held = filter_.locked() && held_scale_.stands_in_for(estimate, config_.scale);
+  if (held) filter_.hold(held_scale_.variance, m.stamp_ns);
   assist_.on_scale(update.verdict);
   ScaleRecord record;
   record.stamp_ns = job.snapshot.stamp_ns;
@@ -376,11 +377,12 @@ ScaleRecord MapSegment::finish_scale(const ScaleJob& job, const ScaleEstimate& e
     scale_path_.extend(position, filter_.path_sigma());
   }
   const bool watched = stereo() && update.verdict == ScaleVerdict::kAccepted;
-  publish_scale(&record, update.apply || watched);
+  const bool known = update.apply || watched || held;
+  publish_scale(&record, known ? std::optional(record.stamp_ns) : std::nullopt);
   return record;
 }
 
-void MapSegment::publish_scale(const ScaleRecord* record, bool accepted) {
+void MapSegment::publish_scale(const ScaleRecord* record, std::optional<std::int64_t> accepted_ns) {
   const std::lock_guard lock(status_mutex_);
   status_.locked = metric();
   status_.log_scale = vo_->log_scale();
@@ -388,12 +390,12 @@ void MapSegment::publish_scale(const ScaleRecord* record, bool accepted) {
   status_.path = scale_path_;
   status_.decalibrated = right_.known().decalibrated();
   status_.right_turn = right_.turn();
+  if (accepted_ns) status_.accepted_stamp_ns = *accepted_ns;
   if (record != nullptr) {
     status_.last_correction = record->correction;
     status_.residual = record->residual;
     status_.verdict = record->verdict;
-    if (accepted) status_.accepted_stamp_ns = record->stamp_ns;
-  } else if (accepted) {
+  } else if (accepted_ns) {
     status_.verdict = ScaleVerdict::kAccepted;
   }
 }

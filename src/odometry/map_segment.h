@@ -8,6 +8,7 @@
 #include "sovo/image/pyramid_pool.h"
 #include "sovo/odometry/exposure_motion.h"
 #include "sovo/odometry/frame_preparation.h"
+#include "sovo/odometry/held_scale.h"
 #include "sovo/odometry/odometry_output.h"
 #include "sovo/odometry/readout_motion.h"
 #include "sovo/odometry/right_camera.h"
@@ -166,7 +167,8 @@ class MapSegment {
   KeyframeOutput own_points(const KeyframeState& state) const;
   void revise(const SE3& T_odom_left, KeyframeOutput* keyframe) const;
   void revise_left(const std::vector<KeyframeState>& left, std::vector<KeyframeOutput>* out);
-  void publish_scale(const ScaleRecord* record, bool accepted);
+  /// `accepted_ns`: of what was accepted, or is held.
+  void publish_scale(const ScaleRecord* record, std::optional<std::int64_t> accepted_ns);
 
   const StereoOdometryConfig& config_;
   const FramePreparation& preparation_;
@@ -185,7 +187,7 @@ class MapSegment {
   ScaleFilter filter_;
   StereoAssist assist_;
 
-  double window_scale_variance_ = 0.0;  ///< Mode stereo: after the last bundle adjustment.
+  HeldScale held_scale_;  ///< After the last bundle adjustment.
   bool initialized_ = false;
   bool broken_ = false;
   std::uint32_t attempts_ = 0;                   ///< Frames given to `initialize`.

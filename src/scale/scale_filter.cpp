@@ -56,6 +56,7 @@ void ScaleFilter::widen(double log_scale) {
 }
 
 ScaleUpdate ScaleFilter::update(const ScaleMeasurement& m) {
+  held_.reset();
   if (locked_) {  // the error has walked since the last keyframe, seen or not
     drift_on(distance(m));
     variance_ += walked(m);
@@ -80,6 +81,7 @@ ScaleUpdate ScaleFilter::update(const ScaleMeasurement& m) {
 
 ScaleUpdate ScaleFilter::watch(const ScaleMeasurement& m, double variance) {
   if (!locked_) return update(m);
+  held_.reset();
   variance_ = std::min(variance, square(kLargestDrift));
   path_variance_ = variance_ * correlation_growth(config_.max_correlation);  // it changes slowly
   ScaleUpdate update;
@@ -103,6 +105,12 @@ ScaleUpdate ScaleFilter::watch(const ScaleMeasurement& m, double variance) {
   }
   last_verdict_ = update.verdict;
   return update;
+}
+
+void ScaleFilter::hold(double variance, std::int64_t stamp_ns) {
+  if (!locked_) return;
+  held_ = variance;
+  accepted_stamp_ns_ = stamp_ns;
 }
 
 ScaleUpdate ScaleFilter::update_tracking(const ScaleMeasurement& m) {
@@ -277,9 +285,15 @@ void ScaleFilter::forget_drift() {
   expected_ = 0.0;
 }
 
-double ScaleFilter::sigma() const { return std::sqrt(variance_ + doubt_); }
+double ScaleFilter::sigma() const {
+  return std::sqrt(std::min(variance_, held_.value_or(variance_)) + doubt_);
+}
 
-double ScaleFilter::path_sigma() const { return std::sqrt(path_variance_ + doubt_); }
+double ScaleFilter::path_sigma() const {
+  if (!held_) return std::sqrt(path_variance_ + doubt_);
+  const double held = *held_ * correlation_growth(config_.max_correlation);  // it changes slowly
+  return std::sqrt(std::min(path_variance_, held) + doubt_);
+}
 
 double ScaleFilter::age_s(std::int64_t stamp_ns) const {
   return locked_ ? 1e-9 * static_cast<double>(stamp_ns - accepted_stamp_ns_) : 0.0;

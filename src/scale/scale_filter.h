@@ -110,6 +110,12 @@ class ScaleFilter {
   /// than what moves a scale (5 %), and a cold start then finds it elsewhere.
   ScaleUpdate watch(const ScaleMeasurement& measurement, double variance);
 
+  /// Something else holds the window's scale, with this variance of log-scale, while the last
+  /// measurement told nothing of it: as good as one that agreed. Before the first lock nothing is
+  /// held. The next measurement counts as if it were not: what holds a scale may err alike each
+  /// time.
+  void hold(double variance, std::int64_t stamp_ns);
+
   bool locked() const { return locked_; }
   /// Whether the next estimate should search the whole range.
   bool wants_cold_start() const { return !locked_ || searching_; }
@@ -161,6 +167,7 @@ class ScaleFilter {
   double drift_covariance_ = 0.0;  ///< Of the drift and the log-scale error.
   double expected_ = 0.0;  ///< Log-scale error that the drift has made since the correction.
   double path_variance_ = 0.0;
+  std::optional<double> held_;  ///< Variance by what holds the scale, since the last measurement.
   double process_noise_ = 0.0;
   double measurement_factor_ = 1.0;
   double last_normalized_ = 0.0;  ///< Innovation over its standard deviation, the one before.

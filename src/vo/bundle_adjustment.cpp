@@ -302,15 +302,28 @@ void BundleAdjuster::hold_world(const std::vector<SE3>& before, const MatX& H,
   window->hold(placed, SE3(turn, before[static_cast<std::size_t>(placed)].translation()));
 }
 
-double BundleAdjuster::scale_information(const WindowLinearization& at,
-                                         const std::vector<PointRef>& points) {
-  double information = 0.0;
+BundleAdjuster::ScaleInformation BundleAdjuster::scale_information(
+    const WindowLinearization& at, const std::vector<PointRef>& points) {
+  ScaleInformation out;
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (at.statics[i].state != ResidualState::kIn) continue;
     const double rho = points[i].point->rho;
-    information += static_cast<double>(at.statics[i].depth.hessian) * rho * rho;
+    const auto hessian = static_cast<double>(at.statics[i].depth.hessian);
+    out.information += hessian * rho * rho;
+    out.of_offset += hessian * rho;
   }
-  return information;
+  return out;
+}
+
+void BundleAdjuster::tell_scale(const Window& window, double noise, BundleResult* result) const {
+  // Static residuals weigh more than their noise would have it, and those of a keyframe share the
+  // errors of its right image.
+  constexpr double kSharedRight = 1.6;
+  const auto [information, of_offset] = scale_information(now_, problem_.points());
+  if (information <= 0.0 || window.static_scale_free()) return;
+  result->scale_variance = config_.static_weight * kSharedRight * noise / information;
+  const double rho_per_px = 1.0 / (window.rig()->right.fx * window.rig()->baseline());
+  result->scale_per_px = rho_per_px * of_offset / information;
 }
 
 void BundleAdjuster::refine_static_scale(Window* window) {
@@ -322,7 +335,7 @@ void BundleAdjuster::refine_static_scale(Window* window) {
     if (now_.statics[i].state != ResidualState::kIn) continue;
     gradient += points[i].point->rho * static_cast<double>(now_.statics[i].depth.gradient);
   }
-  const double information = scale_information(now_, points);
+  const double information = scale_information(now_, points).information;
   if (information <= 0.0) return;
   const double step = std::clamp(-gradient / information, -kLargestStep, kLargestStep);
   window->rescale_statics(std::exp(step));
@@ -415,16 +428,9 @@ BundleResult BundleAdjuster::optimize(Window* window) {
   result.rmse = std::sqrt(energy / std::max(1, kPatternSize * result.residuals));
   result.finite = std::isfinite(result.rmse);
   result.gradient_scatter = problem_.gradient_scatter(now_, static_cast<int>(newest));
-  result.newest_covariance =
-      keyframe_variance(result.rmse, result.gradient_scatter) * newest_covariance(*window, H);
-  if (const double information = scale_information(now_, problem_.points());
-      information > 0.0 && !window->static_scale_free()) {
-    // Static residuals weigh more than their noise would have it, and those of a keyframe share the
-    // errors of its right image.
-    constexpr double kSharedRight = 1.6;
-    const double noise = kSharedRight * keyframe_variance(result.rmse, result.gradient_scatter);
-    result.scale_variance = config_.static_weight * noise / information;
-  }
+  const double noise = keyframe_variance(result.rmse, result.gradient_scatter);
+  result.newest_covariance = noise * newest_covariance(*window, H);
+  tell_scale(*window, noise, &result);
   if (result.lens) result.lens->weigh(1.0 / std::max(result.rmse * result.rmse, 1.0));
   drop_bad_residuals(window);
   return result;

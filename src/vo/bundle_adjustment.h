@@ -110,9 +110,16 @@ class BundleAdjuster {
   bool tells_lens(const Window& window) const;
   /// For residuals of unit noise. Before linearization points move.
   std::optional<LensEvidence> lens_evidence(const Window& window);
-  /// What static residuals that are inliers tell of a common factor of all depths.
-  static double scale_information(const WindowLinearization& at,
-                                  const std::vector<PointRef>& points);
+  /// What static residuals that are inliers tell of the logarithm of a common factor of all inverse
+  /// depths: H, and H times its derivative by a common addend to them [m].
+  struct ScaleInformation {
+    double information = 0.0;
+    double of_offset = 0.0;
+  };
+  static ScaleInformation scale_information(const WindowLinearization& at,
+                                            const std::vector<PointRef>& points);
+  /// Where static residuals hold the scale: how well.
+  void tell_scale(const Window& window, double noise, BundleResult* result) const;
 
   /// An estimate to come back to.
   struct Backup {

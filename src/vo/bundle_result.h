@@ -21,6 +21,10 @@ struct BundleResult {
   Mat6 newest_covariance = Mat6::Zero();
   /// Of a common factor of all depths, by the static residuals; infinite without any.
   double scale_variance = std::numeric_limits<double>::infinity();
+  /// By how much that factor's logarithm changes where all right images are displaced by a pixel
+  /// along their epipolar lines and the depths keep their proportions (absolute value); 0 where
+  /// static residuals do not hold the scale.
+  double scale_per_px = 0.0;
   double gradient_scatter = 1.0;  ///< Of the residuals into the newest keyframe.
   /// Where it was asked for, and the window tells something.
   std::optional<LensEvidence> lens;

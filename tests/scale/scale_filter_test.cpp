@@ -106,6 +106,48 @@ TEST(ScaleFilter, WhatCannotBeSeenSpeaksNotAgainstAWatchedWindow) {
   EXPECT_TRUE(filter.wants_cold_start());
 }
 
+TEST(ScaleFilter, WhatHoldsAScaleTellsOfItUntilTheNextMeasurement) {
+  const ScaleMeasurement blind = measure(0.0, 0.0, false, ScaleVerdict::kTooFewPoints);
+  ScaleFilter filter = locked_filter();
+  ScaleFilter alone = locked_filter();
+  for (int i = 1; i <= 20; ++i) {
+    filter.update(blind);
+    alone.update(blind);
+    filter.hold(1e-5, i);
+    EXPECT_DOUBLE_EQ(filter.sigma(), std::sqrt(1e-5));
+    EXPECT_GT(filter.path_sigma(), 2e-3 + filter.sigma()) << "keyframes share their error";
+    EXPECT_LT(filter.path_sigma(), alone.path_sigma());
+  }
+  EXPECT_GT(alone.sigma(), 0.02);
+  EXPECT_NEAR(filter.age_s(20 + 1'000'000'000), 1.0, 1e-12);
+
+  filter.update(blind);
+  alone.update(blind);
+  EXPECT_DOUBLE_EQ(filter.sigma(), alone.sigma()) << "not held any more";
+  filter.hold(1e-5, 21);
+  const ScaleUpdate update = filter.update(measure(0.02, 0.003));
+  EXPECT_DOUBLE_EQ(update.gain, alone.update(measure(0.02, 0.003)).gain) << "it may err alike";
+  EXPECT_DOUBLE_EQ(filter.sigma(), alone.sigma());
+}
+
+TEST(ScaleFilter, WhatHoldsAScaleWorseThanItIsKnownTellsNothing) {
+  ScaleFilter filter = locked_filter();
+  filter.update(measure(0.0, 0.003));
+  const double sigma = filter.sigma();
+  const double path_sigma = filter.path_sigma();
+  filter.hold(1.0, 1);
+  EXPECT_DOUBLE_EQ(filter.sigma(), sigma);
+  EXPECT_DOUBLE_EQ(filter.path_sigma(), path_sigma);
+}
+
+TEST(ScaleFilter, NothingHoldsAScaleThatThereIsNot) {
+  ScaleFilter filter({});
+  filter.hold(1e-5, 1);
+  EXPECT_FALSE(filter.locked());
+  filter.lock_initial(0.03, 2);
+  EXPECT_DOUBLE_EQ(filter.sigma(), 0.03);
+}
+
 TEST(ScaleFilter, AWatchedFilterLocksAsAnyOther) {
   ScaleFilter filter({});
   EXPECT_FALSE(filter.watch(measure(0.3, 0.001), 0.0).apply);

@@ -4,68 +4,18 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <functional>
-#include <iterator>
+#include <cmath>
 #include <random>
+#include <vector>
 
 #include "sovo/vo/marginalization.h"
-#include "sovo/vo/median.h"
 #include "support/numeric.h"
-#include "vo/window_test_support.h"
+#include "vo/static_residual_support.h"
 
 namespace sovo {
 namespace {
 
 using namespace test;
-
-/// The small camera, and beside it another one with a lens, turned a little.
-StereoRig bent_rig() {
-  StereoRig rig;
-  rig.left = small_camera();
-  rig.right = make_camera(220, 160, 166, 167.5, 108.2, 79.3, Distortion::kRadtan,
-                          {-0.21, 0.05, 0.0012, -0.0007});
-  rig.T_right_left = SE3(SO3::exp(Vec3(0.012, -0.02, 0.015)), Vec3(-0.12, 0.004, 0.006));
-  return rig;
-}
-
-constexpr int kStereoKeyframes = 4;
-constexpr int kStride = 6;
-
-/// What the right cameras of the keyframes see, made once a program.
-const std::vector<ImageF>& right_views() {
-  static const std::vector<ImageF> views = [] {
-    const SyntheticScene scene(3);
-    const StereoRig rig = bent_rig();
-    std::vector<ImageF> out;
-    for (int i = 0; i < kStereoKeyframes; ++i) {
-      const SE3 pose = keyframe_pose(i) * rig.T_right_left.inverse();
-      out.push_back(blurred(blurred(scene.render(rig.right, pose))));
-    }
-    return out;
-  }();
-  return views;
-}
-
-/// Changes the grey levels of a right image: keyframe, pixel, level as seen.
-using Grey = std::function<float(int keyframe, int x, int y, float seen)>;
-float as_seen(int /*keyframe*/, int /*x*/, int /*y*/, float seen) { return seen; }
-
-/// `scene_window` with the right images of its keyframes.
-Window stereo_window(const Grey& grey = as_seen, StaticScale scale = StaticScale::kHeld) {
-  Window window = scene_window(kStereoKeyframes, kStride, 1);
-  window.set_rig(bent_rig(), scale);
-  for (int i = 0; i < window.size(); ++i) {
-    ImageF image = right_views()[static_cast<std::size_t>(i)];
-    for (int y = 0; y < image.height(); ++y) {
-      for (int x = 0; x < image.width(); ++x) image.at(x, y) = grey(i, x, y, image.at(x, y));
-    }
-    window[i].right = pyramid_of(std::move(image));
-    window[i].right_brightness = fit_right_brightness(*window.rig(), window[i], {});
-    for (Point& p : window[i].points) p.static_state = ResidualState::kIn;
-  }
-  window.update_scale_held();
-  return window;
-}
 
 LinearizedResidual static_residual(const Window& window, int host, const Point& point) {
   LinearizedResidual out;
@@ -257,27 +207,6 @@ TEST(StaticResidual, SixGaugeDirectionsAreLeft) {
   EXPECT_GT(f[7], 1e4 * f[6]);
 }
 
-/// Length of the window's way over the true one.
-double scale_of(const Window& window) {
-  const auto centre = [&](int i) { return window[i].T_world_camera().translation(); };
-  const int newest = window.size() - 1;
-  return (centre(newest) - centre(0)).norm() /
-         (keyframe_pose(newest).translation() - keyframe_pose(0).translation()).norm();
-}
-
-/// As of a window that is adjusted three times; the newest keyframe stays the newest.
-double adjusted_scale(Window* window, BundleResult* result = nullptr) {
-  WorkerPool pool(1);
-  const BundleAdjuster proto(WindowConfig(), &pool);
-  for (int i = 0; i < 3; ++i) {
-    BundleAdjuster adjuster = proto;
-    const BundleResult one = adjuster.optimize(window);
-    EXPECT_TRUE(one.finite);
-    if (result != nullptr) *result = one;
-  }
-  return scale_of(*window);
-}
-
 TEST(StaticResidual, BringBackAScaleThatMonocularResidualsLeave) {
   for (const double wrong : {0.97, 1.03}) {
     Window window = stereo_window();
@@ -356,116 +285,6 @@ TEST(StaticResidual, PassIntoThePriorWithTheirPoints) {
   marginalize_points(WindowConfig(), leaving, &mono, &pool);
   EXPECT_GT(held, 100.0);
   EXPECT_LT(std::abs(scale.dot(mono.prior().H * scale)), 1e-3 * held);
-}
-
-/// A window whose map is too large by this factor, with static residuals that leave that be.
-Window free_window(double too_large) {
-  Window window = stereo_window(as_seen, StaticScale::kFree);
-  window.apply_similarity(too_large);
-  window.rescale_statics(1.0 / too_large);  // nothing is known of it yet
-  return window;
-}
-
-TEST(FreeStaticScale, IsFoundAndTheMapKeepsItsOwn) {
-  for (const double wrong : {0.97, 1.03}) {
-    Window window = free_window(wrong);
-    EXPECT_FALSE(window.scale_held());
-    EXPECT_EQ(BundleAdjuster::gauge_basis(window, BundleAdjuster::state_units(window)).cols(), 7);
-    EXPECT_NEAR(adjusted_scale(&window), wrong, 5e-3);
-    EXPECT_NEAR(window.static_scale(), wrong, 5e-3);
-  }
-}
-
-TEST(FreeStaticScale, PointsThatTheRightImageAloneSeesFitTheMap) {
-  constexpr double kWrong = 1.03;
-  const Window truth = stereo_window();
-  Window window = free_window(kWrong);
-  std::mt19937 random(1);
-  std::vector<double> size_before;
-  for (Point& p : window[1].points) {
-    const double error = 0.03 * normal(random);
-    p.rho *= std::exp(error);
-    size_before.push_back(std::abs(error));
-    for (Residual& r : p.residuals) r = Residual();
-  }
-  adjusted_scale(&window);
-  std::vector<double> off;
-  for (std::size_t i = 0; i < window[1].points.size(); ++i) {
-    const Point& p = window[1].points[i];
-    if (p.static_state == ResidualState::kIn) {
-      off.push_back(std::log(p.rho * kWrong / truth[1].points[i].rho));
-    }
-  }
-  ASSERT_GT(off.size(), 50U);
-  std::vector<double> size;
-  std::transform(off.begin(), off.end(), std::back_inserter(size),
-                 [](double x) { return std::abs(x); });
-  EXPECT_NEAR(sovo::median(&off), 0.0, 3e-3) << "not where stereo has them";
-  EXPECT_LT(sovo::median(&size), 0.6 * sovo::median(&size_before));
-}
-
-TEST(FreeStaticScale, GoesAlongWithASimilarity) {
-  Window window = free_window(1.02);
-  adjusted_scale(&window);
-  const auto energy = [&window] {
-    double sum = 0.0;
-    for (const StoredStatic& s : linearized(WindowConfig(), &window).statics) {
-      sum += static_cast<double>(s.energy);
-    }
-    return sum;
-  };
-  const double before = energy();
-  ASSERT_GT(before, 0.0);
-  window.apply_similarity(1.4);
-  EXPECT_NEAR(energy(), before, 1e-3 * before);
-}
-
-TEST(FreeStaticScale, DepthsHaveTheDerivativesOfCentralDifferences) {
-  Window window = stereo_window(as_seen, StaticScale::kFree);
-  window.apply_similarity(1.4);
-  const WindowConfig config;
-  const WindowLinearization at = linearized(config, &window);
-  WorkerPool pool(1);
-  int checked = 0;
-  const std::vector<PointRef> points = collect_points(&window);
-  for (std::size_t i = 0; i < points.size(); i += 7) {
-    if (at.statics[i].state != ResidualState::kIn) continue;
-    Point& p = *points[i].point;
-    const double rho = p.rho;
-    const auto gradient = [&](const Eigen::Matrix<double, 1, 1>& x) {
-      p.rho = x[0];
-      PhotometricProblem problem(config, {points[i]}, &window, &pool);
-      WindowLinearization out;
-      problem.linearize(problem.stored(), {.targets = 0}, &out);
-      return Eigen::Matrix<double, 1, 1>(static_cast<double>(out.statics[0].depth.gradient));
-    };
-    // Of squares of a smooth pattern near its place the gradient rises by the Hessian.
-    const double slope =
-        central_differences<1, 1>(gradient, Eigen::Matrix<double, 1, 1>(rho), 1e-3 * rho)(0, 0);
-    p.rho = rho;
-    const auto hessian = static_cast<double>(at.statics[i].depth.hessian);
-    checked += std::abs(slope - hessian) < 0.3 * hessian ? 1 : 0;
-  }
-  EXPECT_GT(checked, 10);
-}
-
-TEST(FreeStaticScale, WhatLeavesPullsTheMapToMetres) {
-  WorkerPool pool(1);
-  const auto pull = [&pool](double too_large) {
-    Window window = free_window(too_large);
-    window.rescale_statics(too_large);  // found
-    std::vector<PointRef> leaving;
-    for (Point& p : window[0].points) leaving.push_back({0, &p});
-    marginalize_points(WindowConfig(), leaving, &window, &pool);
-    double gradient = 0.0;
-    for (int i = 0; i < window.size(); ++i) {
-      gradient += window.prior().b.segment<3>(8 * i).dot(window[i].T_camera_world.translation());
-    }
-    return gradient;
-  };
-  EXPECT_GT(pull(1.01), 0.0);
-  EXPECT_LT(pull(0.99), 0.0);
-  EXPECT_GT(pull(1.01) - pull(0.99), 10.0 * std::abs(pull(1.0)));
 }
 
 TEST(StaticResidual, VarianceOfTheScaleIsThatOfNoisyRightImages) {

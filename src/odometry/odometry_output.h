@@ -75,7 +75,7 @@ struct OdometryOutput {
   double log_scale_sigma = 0.0;  ///< Posterior standard deviation.
   double last_correction = 0.0;  ///< Newest measured log-scale error.
   double scale_residual = 0.0;   ///< Photometric, of the newest optimization [grey levels].
-  double scale_age_s = 0.0;      ///< Since the last accepted optimization.
+  double scale_age_s = 0.0;      ///< Since it was accepted, or held, last.
   ScaleVerdict scale_verdict = ScaleVerdict::kTooFewPoints;
 
   std::uint64_t received = 0;       ///< Frames given to the odometry.

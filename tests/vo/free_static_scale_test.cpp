@@ -80,7 +80,7 @@ TEST(FreeStaticScale, DisplacedRightImagesMoveItByAsMuchAsIsSaidOfAHeldOne) {
       optimized(kPx, StaticScale::kFree, &free) - optimized(-kPx, StaticScale::kFree, &free);
   EXPECT_EQ(free.scale_per_px, 0.0);
   EXPECT_GT(held.scale_per_px, 0.05) << "the displacement is one of disparities of few pixels";
-  // That is told of the depths that the window came to, which the noise of images has moved.
+  // One is found in a single step before the depths move, the other told of where they came to.
   EXPECT_NEAR(std::abs(change) / (2.0 * kPx), held.scale_per_px, 0.25 * held.scale_per_px);
 }
 
